@@ -1,0 +1,29 @@
+//! Traces Blender scenes on Intel Embree and shades rough surfaces with the
+//! multiple-scattering Smith microfacet BSDFs of Heitz, Hanika, d'Eon and
+//! Dachsbacher (2016).
+//!
+//! # Data flow
+//! ```text
+//! scene.yaml + .obj → Description → resolve → Scene (+ Features) → Path<F> → Film → EXR/PNG + report
+//! ```
+//! Names, defaults and units end at `resolve`: what is rendered has indices
+//! and radiometric quantities alone.
+//!
+//! # Axes and units
+//! As in Blender: right-handed, z up, metres; degrees in files and radians in
+//! code; colours are scene-linear Rec. 709.
+
+pub mod bsdf;
+pub mod camera;
+pub mod description;
+pub mod embree;
+pub mod film;
+pub mod integrator;
+pub mod light;
+pub mod mesh;
+pub mod metrics;
+pub mod microsurface;
+pub mod report;
+pub mod sampler;
+pub mod scene;
+pub mod texture;

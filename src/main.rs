@@ -1,0 +1,3 @@
+//! The `smithwalk` command.
+
+fn main() {}
