@@ -32,7 +32,10 @@ fn main() {
     if private.join(LIBRARY).exists() {
         return link_from(&private);
     }
-    if let Some(dir) = system_folders().into_iter().find(|d| d.join(LIBRARY).exists()) {
+    if let Some(dir) = system_folders()
+        .into_iter()
+        .find(|d| d.join(LIBRARY).exists())
+    {
         println!("cargo:rustc-link-search=native={}", dir.display());
         return;
     }
