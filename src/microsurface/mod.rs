@@ -52,9 +52,11 @@ mod first_order;
 pub mod fresnel;
 pub mod heights;
 mod ndf;
+mod position_free;
 mod proxy;
 mod real;
 mod tally;
+mod two_walk;
 mod vector;
 mod walk;
 
@@ -126,8 +128,8 @@ impl<N, I> Microsurface<N, I> {
         }
         match estimator {
             Estimator::Walk => self.eval_walk(wi, wo, rng, tally),
-            Estimator::TwoWalk => self.eval_walk(wi, wo, rng, tally),
-            Estimator::PositionFree => self.eval_walk(wi, wo, rng, tally),
+            Estimator::PositionFree if I::MIRRORS => self.eval_position_free(wi, wo, rng, tally),
+            Estimator::TwoWalk | Estimator::PositionFree => self.eval_two_walk(wi, wo, rng, tally),
         }
     }
 

@@ -97,16 +97,22 @@ pub(super) fn depth_from_other_side<F: Real>(tau: F) -> F {
     }
 }
 
-/// Russian roulette after `order` interactions; false ends the walk.
+/// Russian roulette after `order` interactions of a walk that began with the
+/// weight `scale`; false ends the walk.
 #[inline]
-pub(super) fn survives<F: Real>(weight: &mut Rgb<F>, order: u32, rng: &mut impl Draw<F>) -> bool {
+pub(super) fn survives<F: Real>(
+    weight: &mut Rgb<F>,
+    scale: F,
+    order: u32,
+    rng: &mut impl Draw<F>,
+) -> bool {
     if order < ROULETTE_FROM {
         return weight.max_channel() > F::zero();
     }
     let mut chance = F::one();
-    let brightest = weight.max_channel();
-    if brightest < F::of(ROULETTE_WEIGHT) {
-        chance = brightest / F::of(ROULETTE_WEIGHT);
+    let (brightest, least) = (weight.max_channel(), F::of(ROULETTE_WEIGHT) * scale);
+    if brightest < least {
+        chance = brightest / least;
     }
     if order >= LONG {
         let n = f64::from(order);
@@ -149,7 +155,7 @@ impl<N, I> Microsurface<N, I> {
             weight *= bounce.weight;
             order += 1;
             ray.follow(&bounce);
-            if !survives(&mut weight, order, rng) {
+            if !survives(&mut weight, F::one(), order, rng) {
                 return None;
             }
         }
@@ -198,7 +204,7 @@ impl<N, I> Microsurface<N, I> {
             let bounce = self.facets.scatter(at.side, at.w, m, rng);
             weight *= bounce.weight;
             ray.follow(&bounce);
-            if !survives(&mut weight, order, rng) {
+            if !survives(&mut weight, F::one(), order, rng) {
                 return;
             }
         }

@@ -104,6 +104,11 @@ impl<F: Real> Facets<F> for Dielectric<F> {
         }
     }
 
+    #[inline]
+    fn relative_index(&self) -> F {
+        self.eta
+    }
+
     /// Within rounding of η = 1, where half vectors carry no digits.
     #[inline]
     fn invisible(&self) -> Option<Rgb<F>> {

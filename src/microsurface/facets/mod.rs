@@ -103,6 +103,12 @@ pub trait Facets<F: Real>: Copy {
     /// These facets seen from the other side.
     fn inverted(&self) -> Self;
 
+    /// n(below) / n(above).
+    #[inline]
+    fn relative_index(&self) -> F {
+        F::one()
+    }
+
     /// The colour of what goes straight on, where the surface is none: a
     /// dielectric as dense as its surroundings.
     #[inline]
