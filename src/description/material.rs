@@ -2,7 +2,7 @@
 
 use super::value::{self, Clash, Color, Scalar};
 use serde::Deserialize;
-use serde::de::{Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
 use std::fmt;
 
 /// How a surface scatters, passes or emits light.
@@ -183,8 +183,14 @@ impl<'de> Deserialize<'de> for MaterialRef {
                 Ok(MaterialRef::Name(name.to_owned()))
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<MaterialRef, A::Error> {
-                let material = Material::deserialize(MapAccessDeserializer::new(map))?;
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<MaterialRef, A::Error> {
+                let material = Material::deserialize(MapAccessDeserializer::new(&mut map))?;
+                if map.next_key::<de::IgnoredAny>()?.is_some() {
+                    return Err(de::Error::invalid_value(
+                        de::Unexpected::Map,
+                        &"map with a single key",
+                    ));
+                }
                 Ok(MaterialRef::Inline(Box::new(material)))
             }
         }

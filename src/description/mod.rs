@@ -4,10 +4,15 @@
 //! format itself is described in `docs/scene-format.md`.
 
 mod camera;
+mod document;
 mod light;
 mod material;
+mod overrides;
+mod problem;
+mod read;
 mod settings;
 mod transform;
+mod validate;
 mod value;
 
 pub use camera::{
@@ -18,9 +23,12 @@ pub use material::{
     Axis, Conductor, Dielectric, Diffuse, Distribution, Emission, Material, MaterialRef, Metal,
     Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Tangent, Transparent,
 };
+pub use problem::{Problem, Problems};
 pub use settings::{Aov, Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
 pub use value::{Channel, Color, Scalar};
+
+use problem::Sources;
 
 use crate::texture::{ColorSpace, Interpolation};
 use serde::Deserialize;
@@ -68,9 +76,91 @@ pub struct Description {
 }
 
 impl Description {
+    /// Reads a scene file and replaces the values that `overrides` (dotted
+    /// path, YAML) name.
+    ///
+    /// # Errors
+    /// All that is wrong with the file and the overrides, in types, ranges
+    /// and references alike; files that the scene names are not opened.
+    pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, Problems> {
+        let name = path.display().to_string();
+        let whole = |message| Problems::new(vec![Problem::of_source(&name, message)]);
+        let bytes = std::fs::read(path)
+            .map_err(|error| whole(format!("the scene can't be read: {error}")))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = error.utf8_error().valid_up_to();
+            let line = error.as_bytes()[..valid]
+                .iter()
+                .filter(|&&byte| byte == b'\n')
+                .count()
+                + 1;
+            whole(format!("expected UTF-8, found other bytes in line {line}"))
+        })?;
+        let mut description = Self::from_str(&text, &name, overrides)?;
+        description.directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(description)
+    }
+
+    /// As [`Description::load`], with paths relative to the working directory.
+    ///
+    /// # Errors
+    /// As [`Description::load`]; `source_name` stands for the file's name.
+    pub fn from_str(
+        text: &str,
+        source_name: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Problems> {
+        let mut sources = Sources::default();
+        let source = sources.add(source_name, text);
+        let tree = document::parse(text, source, 0, &mut sources);
+        let Some(mut tree) = tree else {
+            if sources.count() == 0 {
+                sources.report_whole(source, "the scene is empty");
+            }
+            return Err(sources.into_problems());
+        };
+        for (path, value) in overrides {
+            overrides::apply(&mut tree, path, value, &mut sources);
+        }
+        let description = read::read::<Self>(&mut tree, &mut sources);
+        if let Some(description) = &description {
+            validate::description(description, &tree, &mut sources);
+        }
+        match description {
+            Some(description) if sources.count() == 0 => Ok(description),
+            _ => Err(sources.into_problems()),
+        }
+    }
+
     /// The path of a file that the description names.
     pub fn resolve_path(&self, file: &Path) -> PathBuf {
         self.directory.join(file)
+    }
+}
+
+impl Material {
+    /// Reads a single material, which can name neither textures nor other
+    /// materials.
+    ///
+    /// # Errors
+    /// All that is wrong with the text.
+    pub fn from_yaml(text: &str) -> Result<Self, Problems> {
+        let mut sources = Sources::default();
+        let source = sources.add("material", text);
+        let Some(mut tree) = document::parse(text, source, 0, &mut sources) else {
+            if sources.count() == 0 {
+                sources.report_whole(source, "the material is empty");
+            }
+            return Err(sources.into_problems());
+        };
+        let material = read::read::<Self>(&mut tree, &mut sources);
+        if let Some(material) = &material {
+            validate::material(material, &tree, &mut sources);
+        }
+        match material {
+            Some(material) if sources.count() == 0 => Ok(material),
+            _ => Err(sources.into_problems()),
+        }
     }
 }
 

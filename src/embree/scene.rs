@@ -99,7 +99,7 @@ pub struct Accelerator {
     /// Scenes that instances refer to, and the buffers that Embree reads in
     /// place: kept for as long as the root scene is.
     _shared: Vec<RawScene>,
-    _buffers: Vec<(Arc<Vertices>, Arc<Vec<[u32; 3]>>)>,
+    _buffers: Vec<SharedMesh>,
     _device: Arc<Device>,
 }
 
