@@ -72,19 +72,15 @@ impl Environment {
             }
             let texel = |x: usize| {
                 let (left, right) = ((x + width - 1) % width, (x + 1) % width);
-                mean_of_bilinear(blurred[left], blurred[x], blurred[right])
+                f64::from(mean_of_bilinear(blurred[left], blurred[x], blurred[right]))
             };
             let row = select::accumulate((0..width).map(texel), &mut columns);
             let solid_angle =
                 (sin_edges[y] - sin_edges[y + 1]) * std::f64::consts::TAU / width as f64;
             row_weights.push(row.unwrap_or(0.0) * solid_angle);
         }
-        let total: f64 = row_weights.iter().sum();
         let mut rows = Vec::with_capacity(height);
-        select::accumulate(
-            row_weights.iter().map(|weight| (weight / total) as f32),
-            &mut rows,
-        )?;
+        let total = select::accumulate(row_weights.iter().copied(), &mut rows)?;
         Some(Self {
             width,
             height,

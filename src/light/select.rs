@@ -15,7 +15,7 @@ pub(super) struct Table {
 impl Table {
     /// In proportion to `weights`, finite and not negative; `None` when all
     /// are zero.
-    pub(super) fn new(weights: impl Iterator<Item = f32> + Clone) -> Option<Self> {
+    pub(super) fn new(weights: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let mut cumulative = Vec::with_capacity(weights.size_hint().0);
         accumulate(weights, &mut cumulative)?;
         Some(Self { cumulative })
@@ -39,17 +39,17 @@ impl Table {
 /// Appends the normalised running sums of `weights` and returns their total;
 /// `None`, with zeros appended, when they are all zero.
 pub(super) fn accumulate(
-    weights: impl Iterator<Item = f32> + Clone,
+    weights: impl Iterator<Item = f64> + Clone,
     cumulative: &mut Vec<f32>,
 ) -> Option<f64> {
-    let total: f64 = weights.clone().map(f64::from).sum();
+    let total: f64 = weights.clone().sum();
     if total <= 0.0 {
         cumulative.extend(weights.map(|_| 0.0));
         return None;
     }
     let mut sum = 0.0;
     cumulative.extend(weights.map(|weight| {
-        sum += f64::from(weight);
+        sum += weight;
         (sum / total) as f32
     }));
     Some(total)
@@ -97,7 +97,7 @@ impl Chooser {
             0 => None,
             1 => Some(Self::Only),
             n if n <= FEW => Some(Self::ByContribution(n)),
-            _ => Table::new(powers.iter().map(|&power| power.min(MOST))).map(Self::ByPower),
+            _ => Table::new(powers.iter().map(|&power| power.min(MOST).into())).map(Self::ByPower),
         }
     }
 

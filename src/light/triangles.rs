@@ -46,8 +46,7 @@ impl Triangles {
             }
         };
         let total: f64 = triangles.iter().map(weight).sum();
-        // In shares of the total: products of small areas leave the range of f32.
-        let table = Table::new(triangles.iter().map(|t| (weight(t) / total) as f32))?;
+        let table = Table::new(triangles.iter().map(weight))?;
         let shining = || triangles.iter().filter(|t| weight(t) > 0.0);
         let corners = || shining().flat_map(|t| t.vertices);
         let low = corners().fold(Vec3::INFINITY, Vec3::min);
