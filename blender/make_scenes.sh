@@ -42,8 +42,14 @@ gold_sphere() {
     done
 }
 
+suzanne() {
+    build suzanne
+    cycles34 suzanne multi_ggx --percent 50 --spp 256 --seeds 3 --seed 1
+    cycles45 suzanne ggx --percent 50 --distribution GGX --spp 256 --seeds 2 --seed 1
+}
+
 if [ $# -eq 0 ]; then
-    set -- gold_sphere
+    set -- gold_sphere suzanne
 fi
 for scene; do
     "$scene"
