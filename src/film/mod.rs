@@ -15,7 +15,6 @@ mod filter;
 mod image;
 mod noise;
 mod output;
-mod png;
 mod resume;
 mod tile;
 
@@ -69,6 +68,23 @@ impl Window {
             height,
         } = *self;
         (y..y + height).flat_map(move |row| (x..x + width).map(move |column| [column, row]))
+    }
+
+    /// The pixels in both windows, if there are any.
+    pub fn intersect(&self, other: Self) -> Option<Self> {
+        let overlap = |a: u32, a_size: u32, b: u32, b_size: u32| {
+            let start = a.max(b);
+            let end = (a + a_size).min(b + b_size);
+            (end > start).then(|| (start, end - start))
+        };
+        let (x, width) = overlap(self.x, self.width, other.x, other.width)?;
+        let (y, height) = overlap(self.y, self.height, other.y, other.height)?;
+        Some(Self {
+            x,
+            y,
+            width,
+            height,
+        })
     }
 
     /// Where `pixel` comes in the order of [`Self::pixels`].

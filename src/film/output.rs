@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Image, exr, png};
+use super::{Image, exr};
 
 /// Why an image can't be written.
 #[derive(Debug, thiserror::Error)]
@@ -109,7 +109,7 @@ impl OutputPath {
             Format::Exr => exr::encode(image, file).map_err(|error| error.to_string()),
             Format::Png => {
                 use ::image::ImageEncoder;
-                let pixels = png::encode(image, exposure);
+                let pixels = image.to_srgb8(exposure);
                 let [width, height] = [image.window.width, image.window.height];
                 ::image::codecs::png::PngEncoder::new(file)
                     .write_image(&pixels, width, height, ::image::ExtendedColorType::Rgb8)
