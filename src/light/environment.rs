@@ -3,6 +3,7 @@
 use super::select;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
+use crate::texture::EnvironmentImage;
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -35,27 +36,19 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Of `width` × `height` texels, the upper row first. `scale` makes a texel
-    /// a radiance in W·m⁻²·sr⁻¹; `to_image` turns world directions into the
-    /// image's. Texels that are negative or not finite count as black. `None`
-    /// when nothing shines.
+    /// `scale` makes a texel a radiance in W·m⁻²·sr⁻¹; `to_image` turns world
+    /// directions into the image's. `None` when nothing shines.
     ///
     /// # Panics
-    /// When `pixels` has not `width · height` entries.
+    /// When the image has not as many pixels as it says.
     #[must_use]
-    pub fn new(
-        width: usize,
-        height: usize,
-        mut pixels: Vec<[f32; 3]>,
-        scale: Rgb,
-        to_image: Mat3,
-    ) -> Option<Self> {
+    pub fn new(image: EnvironmentImage, scale: Rgb, to_image: Mat3) -> Option<Self> {
+        let EnvironmentImage {
+            width,
+            height,
+            pixels,
+        } = image;
         assert_eq!(pixels.len(), width * height, "the image's size");
-        for channel in pixels.as_flattened_mut() {
-            if !(channel.is_finite() && *channel > 0.0) {
-                *channel = 0.0;
-            }
-        }
         let sin_edges: Vec<f64> = (0..=height)
             .map(|row| (std::f64::consts::PI * (0.5 - row as f64 / height as f64)).sin())
             .collect();
