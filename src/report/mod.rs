@@ -1,1 +1,3 @@
-//! (see the crate's front page)
+//! Reports: what was measured, as tables, figures and pages.
+
+pub mod plot;
