@@ -1,3 +1,4 @@
 //! Reports: what was measured, as tables, figures and pages.
 
 pub mod plot;
+pub mod validate;
