@@ -25,7 +25,7 @@ use std::sync::Arc;
 pub use departure::{Departure, Estimate};
 use field::{Grid, Patch};
 pub use heights::{HeightCase, Start, visible_heights};
-pub use lobes::{Lobe, LobeCase, Mirroring, ORDERS, PSI_BINS, outgoing_lobes};
+pub use lobes::{Lobe, LobeCase, Material, ORDERS, PSI_BINS, outgoing_lobes};
 
 use crate::embree::{Device, EmbreeError};
 
@@ -126,15 +126,4 @@ pub enum HeightFieldError {
         "a height field needs 2 to 16384 cells along its side, 2 realisations, and a ray and a walk for each: {0:?}"
     )]
     Config(Config),
-}
-
-/// The different values of `alpha`, in order of appearance.
-fn distinct(alphas: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut seen = Vec::new();
-    for alpha in alphas {
-        if !seen.contains(&alpha) {
-            seen.push(alpha);
-        }
-    }
-    seen
 }

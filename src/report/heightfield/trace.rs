@@ -203,3 +203,121 @@ fn local_to_world(v: Vector3<f64>, side: Side) -> DVec3 {
         Side::Below => -d,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::departure::Estimate;
+    use super::super::field::{Grid, stream, synthesize};
+    use super::*;
+    use crate::embree::Device;
+    use crate::microsurface::{Conductor, ConductorFresnel, Dielectric, Draw};
+
+    const GRID: Grid = Grid {
+        side: 12.0,
+        cells: 96,
+    };
+
+    fn patch(device: &Arc<Device>, alpha: [f64; 2], rng: &mut Random) -> Patch {
+        Patch::new(device, GRID, &synthesize(GRID, rng), alpha).expect("a surface")
+    }
+
+    fn device() -> Arc<Device> {
+        Arc::new(Device::new(1).expect("Embree is installed"))
+    }
+
+    /// From straight above, the slopes of the facets that are hit have the
+    /// variance α²/2 along each axis.
+    #[test]
+    fn facets_have_the_slopes_of_beckmann() {
+        let (device, alpha) = (device(), [1.0, 0.25]);
+        let variances: Vec<[f64; 2]> = (0..24)
+            .map(|seed| {
+                let mut rng = stream(seed, 1);
+                let patch = patch(&device, alpha, &mut rng);
+                let mut sums = [0.0; 2];
+                for _ in 0..2000 {
+                    let mut flight = Flight {
+                        position: patch.on_top([rng.draw(), rng.draw()]),
+                        direction: DVec3::NEG_Z,
+                        side: Side::Above,
+                    };
+                    let Meeting::Facet(n) = patch.meet(&mut flight) else {
+                        panic!("{flight:?} met nothing");
+                    };
+                    sums[0] += (n.x / n.z).powi(2) / 2000.0;
+                    sums[1] += (n.y / n.z).powi(2) / 2000.0;
+                }
+                sums
+            })
+            .collect();
+        // The mesh's slopes are difference quotients over a cell.
+        let cell = GRID.side / GRID.cells as f64;
+        let flattening = -(-cell * cell).exp_m1() / (cell * cell);
+        for axis in 0..2 {
+            let seen = Estimate::of(variances.iter().map(|v| v[axis]));
+            let expected = 0.5 * alpha[axis].powi(2) * flattening;
+            // Student's t with 23 degrees of freedom passes 5 once in 2e4.
+            let score = (seen.value - expected) / seen.error;
+            assert!(score.abs() < 5.0, "axis {axis}: {seen:?} for {expected}");
+        }
+    }
+
+    /// A ray hits the same facet however many borders lie before it.
+    #[test]
+    fn rays_go_on_across_the_border() {
+        let mut rng = stream(3, 3);
+        let patch = patch(&device(), [1.0; 2], &mut rng);
+        let mut strays = 0;
+        for _ in 0..2000 {
+            let [u, v]: [f64; 2] = [rng.draw(), rng.draw()];
+            let near = Flight {
+                position: patch.on_top([rng.draw(), rng.draw()]),
+                direction: DVec3::new(u - 0.5, v - 0.5, -0.1).normalize(),
+                side: Side::Above,
+            };
+            let mut far = near;
+            let back = near.position - near.direction * (7.3 * patch.half.x);
+            far.position = DVec3::new(
+                back.x - 2.0 * patch.half.x * (back.x / (2.0 * patch.half.x)).round(),
+                back.y - 2.0 * patch.half.y * (back.y / (2.0 * patch.half.y)).round(),
+                back.z,
+            );
+            let mut near = near;
+            assert!(matches!(patch.meet(&mut near), Meeting::Facet(_)));
+            assert!(matches!(patch.meet(&mut far), Meeting::Facet(_)));
+            strays += u32::from(near.position.distance(far.position) > 1e-3);
+        }
+        // Those that graze a crest, or land on the border itself.
+        assert!(strays <= 10, "{strays} of 2000 went elsewhere");
+    }
+
+    /// Facets without loss lose nothing, and light stays on its side.
+    #[test]
+    fn lossless_walks_all_come_out() {
+        let mut rng = stream(4, 4);
+        let patch = patch(&device(), [2.0; 2], &mut rng);
+        let mirror = Conductor {
+            fresnel: ConductorFresnel::Constant(Rgb::white()),
+        };
+        let glass = Dielectric {
+            eta: 1.5,
+            tint: Rgb::white(),
+        };
+        let wi = Vector3::spherical(0.3, 0.0);
+        let mut below = 0;
+        for _ in 0..5000 {
+            let u = [rng.draw(), rng.draw()];
+            let exit = patch.walk(&mirror, wi, u, &mut rng).expect("not lost");
+            assert!(exit.direction.z > 0.0 && exit.order > 0);
+            let exit = patch.walk(&glass, wi, u, &mut rng).expect("not lost");
+            assert_eq!(exit.weight, Rgb::white());
+            below += u32::from(exit.direction.z < 0.0);
+        }
+        assert!(
+            (2500..5000).contains(&below),
+            "{below} of 5000 went through"
+        );
+    }
+}
