@@ -75,15 +75,15 @@ const ALPHA: f64 = 1.0;
 
 /// The four cases of the talk, at several slants.
 const SETTINGS: [Setting; 9] = [
-    setting(NORMAL, Start::Outside, -1.0, [0.0; 2]),
-    setting(TILTED, Start::Outside, -0.7, [0.0; 2]),
-    setting(TILTED, Start::Outside, -0.3, [0.0; 2]),
-    setting(TILTED, Start::Outside, -0.1, [0.0; 2]),
-    setting(DOWN, Start::Inside(0.0), -0.7, [0.0; 2]),
-    setting(DOWN, Start::Inside(0.0), -0.3, [0.0; 2]),
-    setting(UP, Start::Inside(0.0), 0.7, [0.0; 2]),
-    setting(UP, Start::Inside(0.0), 0.3, [0.0; 2]),
-    setting(UP, Start::Inside(0.0), 0.1, [0.0; 2]),
+    setting(NORMAL, Start::Outside, -1.0, [0.004, 0.0]),
+    setting(TILTED, Start::Outside, -0.7, [0.006, 0.0]),
+    setting(TILTED, Start::Outside, -0.3, [0.034, 0.0]),
+    setting(TILTED, Start::Outside, -0.1, [0.026, 0.0]),
+    setting(DOWN, Start::Inside(0.0), -0.7, [0.009, 0.0]),
+    setting(DOWN, Start::Inside(0.0), -0.3, [0.056, 0.0]),
+    setting(UP, Start::Inside(0.0), 0.7, [0.042, 0.006]),
+    setting(UP, Start::Inside(0.0), 0.3, [0.027, 0.054]),
+    setting(UP, Start::Inside(0.0), 0.1, [0.061, 0.053]),
 ];
 
 const fn setting(name: &'static str, start: Start, travel_z: f64, tabulated: [f64; 2]) -> Setting {
