@@ -55,7 +55,7 @@ impl Config {
             patch: 32.0,
             cells: 12.0,
             realisations: 16,
-            rays: 40_000,
+            rays: 20_000,
             walks_per_ray: 2,
             seed: 1,
         }
