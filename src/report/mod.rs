@@ -1,4 +1,5 @@
 //! Reports: what was measured, as tables, figures and pages.
 
+pub mod heightfield;
 pub mod plot;
 pub mod validate;
