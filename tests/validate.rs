@@ -22,7 +22,10 @@ fn the_model_holds_and_the_report_says_so() {
     for statement in statements {
         for check in statement["checks"].as_array().unwrap() {
             assert!(check["cases"].as_u64() > Some(0), "{check}");
-            assert!(check["bound"].is_f64() && check["worst"].is_f64(), "{check}");
+            assert!(
+                check["bound"].is_f64() && check["worst"].is_f64(),
+                "{check}"
+            );
         }
     }
     let saved = std::fs::read(directory.join("validate.json")).unwrap();
