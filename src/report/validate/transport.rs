@@ -552,7 +552,7 @@ pub fn single_scattering<M: Model>(model: M, effort: Effort) -> Result<Statement
         mean
     };
     let shares = each_facets!(model, effort, |name, facets, _bend| {
-        let cases = all.par_iter().map(|&(i, (d, wi))| {
+        let cases = all.par_iter().filter_map(|&(i, (d, wi))| {
             let surface = Microsurface {
                 ndf: model.ndf(d),
                 facets,
@@ -566,7 +566,9 @@ pub fn single_scattering<M: Model>(model: M, effort: Effort) -> Result<Statement
                 weighted.add(single.map_or(0.0, |e| e.weight.0[0]));
             }
             let name = format!("{name}, {}, cosθ {:.2}", d.name(), wi.z);
-            Case::new(name, left.score_against(&weighted))
+            // A share, of which too few walks have the other fate, is not normal.
+            let rare = samples as f64 * weighted.mean.min(1.0 - weighted.mean);
+            (rare > 50.0).then(|| Case::new(name, left.score_against(&weighted)))
         });
         cases.collect::<Vec<_>>()
     });
