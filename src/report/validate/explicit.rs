@@ -15,7 +15,13 @@ fn check(subject: &str, departures: &[(String, Departure)]) -> Check {
     let each = sidak(departures.len());
     let cases = departures.iter().map(|(name, d)| {
         let name = format!("{name}: {:.4} ± {:.4}", d.value, d.error);
-        Case::new(name, d.value / d.bound(each))
+        // Where every ray must hit, neither the distance nor its bound is above 0.
+        let excess = if d.value == 0.0 {
+            0.0
+        } else {
+            d.value / d.bound(each)
+        };
+        Case::new(name, excess)
     });
     Check {
         statistic: "distance over bound",
