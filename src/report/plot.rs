@@ -293,7 +293,7 @@ impl Chart {
                 let ends = [(x, y), (x + 24, y)];
                 match series.mark {
                     Mark::Dashes => {
-                        area.draw(&DashedPathElement::new(ends.into_iter(), 6, 4, style))?;
+                        area.draw(&DashedPathElement::new(ends, 6, 4, style))?;
                     }
                     Mark::Line | Mark::Both => area.draw(&PathElement::new(ends, style))?,
                     Mark::Points => {}

@@ -98,7 +98,7 @@ fn rows<N: Ndf<f32>, M: Ndf<f64>>(
             // Below what f32 holds with full precision there is nothing to compare.
             if b.abs() > 1e-30 {
                 let difference: f64 = (a / b - 1.0).abs();
-                if !(difference <= worst[k].0) {
+                if difference.is_nan() || difference > worst[k].0 {
                     worst[k] = (difference, view.z);
                 }
             }
