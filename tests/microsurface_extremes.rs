@@ -320,7 +320,7 @@ impl Worst {
         // Below the normal numbers of f32 there is no relative precision.
         if double.abs() > 1e-35 && double.abs() < 1e37 {
             let difference = (f64::from(single) / double - 1.0).abs();
-            if !(difference <= self.difference) {
+            if difference > self.difference || difference.is_nan() {
                 self.difference = difference;
                 self.at = format!("{}: {single:e} against {double:e}", at());
             }
