@@ -106,7 +106,7 @@ impl Range {
     fn words(self) -> String {
         match self {
             Self::Positive => "a number above 0".to_owned(),
-            Self::NonNegative => "a number from 0".to_owned(),
+            Self::NonNegative => "a number, 0 or more".to_owned(),
             Self::Within(low, high) => format!("a number from {low} to {high}"),
             Self::Above(low, high) => format!("a number above {low} and up to {high}"),
             Self::Between(low, high) => format!("a number above {low} and below {high}"),

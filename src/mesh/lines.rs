@@ -71,21 +71,18 @@ impl<R: BufRead> Lines<R> {
 
     /// Judges what the parser made of the lines.
     pub fn finish(mut self, loaded: tobj::LoadResult) -> Result<Parts, Vec<LineProblem>> {
-        let beyond = self
-            .ahead
-            .iter()
-            .filter(|(_, kind, index)| *index > self.counts[*kind]);
-        let beyond: Vec<_> = beyond
-            .map(|&(line, kind, index)| LineProblem {
-                line: Some(line),
-                message: format!(
-                    "there is no {} {index}; the last before the end of its group is {}",
-                    KINDS[kind], self.counts[kind]
-                ),
-            })
-            .collect();
-        self.problems.extend(beyond);
+        for &(line, kind, index) in &self.ahead {
+            let count = self.counts[kind];
+            if index > count {
+                let message = format!("there is no {} {index}, only {count}", KINDS[kind]);
+                self.problems.push(LineProblem {
+                    line: Some(line),
+                    message,
+                });
+            }
+        }
         self.problems.sort_by_key(|problem| problem.line);
+        self.problems.dedup();
         self.problems.truncate(MAX_PROBLEMS);
         match loaded {
             Ok((models, _)) if self.problems.is_empty() => {
@@ -98,10 +95,14 @@ impl<R: BufRead> Lines<R> {
                 }
                 Ok((models, self.names, repairs))
             }
-            Err(error) if self.problems.is_empty() => Err(vec![LineProblem {
-                line: Some(self.number),
-                message: error.to_string(),
-            }]),
+            Err(error) if self.problems.is_empty() => {
+                let line = String::from_utf8_lossy(&self.raw);
+                let message = format!("{error} in `{}`", line.trim());
+                Err(vec![LineProblem {
+                    line: Some(self.number),
+                    message,
+                }])
+            }
             _ => Err(self.problems),
         }
     }
@@ -330,7 +331,14 @@ fn push_decimal(out: &mut Vec<u8>, mut number: u64) {
 impl<R: BufRead> BufRead for Lines<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.taken == self.ready.len() {
-            self.advance()?;
+            if let Err(error) = self.advance() {
+                let message = format!("the mesh can't be read: {error}");
+                self.problems.push(LineProblem {
+                    line: None,
+                    message,
+                });
+                return Err(error);
+            }
         }
         Ok(&self.ready[self.taken..])
     }

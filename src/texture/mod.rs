@@ -138,7 +138,12 @@ impl Texture {
         let [u, v] = [0, 1].map(|axis| {
             let place =
                 f64::from(uv[axis]) * f64::from(self.scale[axis]) + f64::from(self.offset[axis]);
-            place - place.floor()
+            // Coordinates that are none would make colours that are none.
+            if place.is_finite() {
+                place - place.floor()
+            } else {
+                0.0
+            }
         });
         let [x, y] = [u * width as f64, v * height as f64];
         let mut value = match self.interpolation {
