@@ -1,4 +1,5 @@
-//! The `smithwalk` command.
+//! The `smithwalk` command: parses, dispatches, sets the exit code. Commands
+//! write to the streams they are given and never print by themselves.
 
 mod cli;
 
@@ -6,20 +7,15 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-/// An Embree path tracer whose rough surfaces keep their energy.
-#[derive(Parser)]
-#[command(version)]
-enum Command {
-    Diff(cli::diff::Args),
-}
-
 fn main() -> ExitCode {
-    let mut out = std::io::stdout().lock();
-    let result = match Command::parse() {
-        Command::Diff(args) => cli::diff::run(&args, &mut out),
-    };
-    result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        ExitCode::from(2)
-    })
+    let cli = cli::Cli::parse();
+    match cli.run(&mut std::io::stdout().lock(), &mut std::io::stderr().lock()) {
+        Ok(code) => code,
+        // A closed pipe (`| head`) is no failure of ours.
+        Err(error) if cli::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
 }

@@ -200,6 +200,13 @@ impl WalkStream {
     }
 }
 
+impl crate::microsurface::Draw<f32> for WalkStream {
+    #[inline]
+    fn draw(&mut self) -> f32 {
+        self.next_f32()
+    }
+}
+
 /// Four dimensions of sample `index` < 2¹⁶ of the Sobol sequence scrambled by
 /// `key`, in [0, 1).
 ///

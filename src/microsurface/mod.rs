@@ -1,1 +1,149 @@
-//! (see the crate's front page)
+//! Microfacet BSDFs with multiple scattering on the Smith microsurface.
+//!
+//! The model is Heitz, Hanika, d'Eon and Dachsbacher 2016,
+//! "Multiple-Scattering Microfacet BSDFs with the Smith Model"
+//! (<https://eheitzresearch.wordpress.com/240-2/>): light walks among
+//! micro-facets whose heights and normals are independent, until it leaves.
+//! It keeps all the energy that single scattering loses, for any roughness.
+//!
+//! A [`Microsurface`] is a distribution of normals ([`Ggx`], [`Beckmann`],
+//! [`Quadratic`]) and what its facets do ([`Conductor`], [`Dielectric`],
+//! [`Diffuse`]), in `f32` or `f64`. It knows nothing of a renderer.
+//!
+//! # Conventions
+//! - Local frame, z = the macroscopic normal. ω_i and ω_o are unit vectors
+//!   that point away from the surface; ω_i is above it, ω_o below it for
+//!   transmission.
+//! - A BSDF value always includes the cosine, f(ω_i, ω_o) |cosθ_o|, in sr⁻¹.
+//!   Transmission follows the energy: without absorption the integral over
+//!   both hemispheres of ω_o is 1. So a renderer transports L/n², and
+//!   f(ω_i, ω_o) n_i² = f(ω_o, ω_i) n_o².
+//! - α is slope roughness, not its square root.
+//!
+//! # Depth in place of height
+//! With C1 the distribution function of heights, the walk tracks the optical
+//! depth τ = −ln C1 ≥ 0 below the top of the microsurface. In τ, collisions
+//! come at a constant rate per direction, and the height distribution drops
+//! out of everything but reports of heights.
+//!
+//! ```
+//! use rand::SeedableRng;
+//! use smithwalk::microsurface::*;
+//!
+//! let gold = Microsurface {
+//!     ndf: Ggx::isotropic(0.64_f32),
+//!     facets: Conductor { fresnel: ConductorFresnel::Constant(Rgb([1.0, 0.71, 0.29])) },
+//! };
+//! let mut rng = Stream(rand_pcg::Pcg32::seed_from_u64(1));
+//! let wi = Vector3::spherical(0.5, 0.0);
+//! if let Some(exit) = gold.sample(wi, &mut rng) {
+//!     assert!(exit.direction.z > 0.0 && exit.weight.max_channel() <= 1.0);
+//! }
+//!
+//! // What single and multiple scattering send towards a direction.
+//! let mut split = Split::default();
+//! gold.eval(Estimator::Walk, wi, Vector3::spherical(0.8, 2.0), &mut rng, &mut split);
+//! assert!(split.total().max_channel() >= 0.0);
+//! ```
+
+mod draw;
+mod facets;
+mod first_order;
+pub mod fresnel;
+pub mod heights;
+mod ndf;
+mod position_free;
+mod proxy;
+mod real;
+mod tally;
+mod two_walk;
+mod vector;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+pub use draw::{Draw, Stream};
+pub use facets::{At, Bounce, Conductor, Dielectric, Diffuse, Facets, Phase, Side};
+pub use fresnel::ConductorFresnel;
+pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};
+pub use real::{Real, ln_beta};
+pub use tally::{PerOrder, Split, Tally, Total};
+pub use vector::{Rgb, Vector3};
+
+/// A rough surface: the distribution of its micro-normals, and what happens
+/// at one of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Microsurface<N, I> {
+    /// Distribution of micro-normals.
+    pub ndf: N,
+    /// Interaction at a facet.
+    pub facets: I,
+}
+
+/// How light left the microsurface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exit<F> {
+    /// Unit direction, away from the surface; z < 0 is transmission.
+    pub direction: Vector3<F>,
+    /// f |cosθ_o| over the density of the walk: the share that was not
+    /// absorbed, per channel. At most 1, unless roulette has kept alive a
+    /// walk of thousands of orders.
+    pub weight: Rgb<F>,
+    /// The number of facets met, ≥ 1.
+    pub order: u32,
+}
+
+/// The unbiased estimators of f(ω_i, ω_o) |cosθ_o|, all orders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Estimator {
+    /// One walk from ω_i, connected to ω_o at every facet (Heitz et al. 2016,
+    /// § 4.3): the reference for the others.
+    Walk,
+    /// The first order in closed form; higher ones from a walk on either
+    /// side, combined by the balance heuristic. Bounded.
+    TwoWalk,
+    /// The two walks with the depth integrated out. For conductors; other
+    /// facets fall back to [`Estimator::TwoWalk`].
+    PositionFree,
+}
+
+impl<N, I> Microsurface<N, I> {
+    /// Estimates f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by `estimator`, giving each
+    /// order's share to `tally`. Nothing is given where the value is 0:
+    /// outside ω_i,z > 0, or below an opaque surface.
+    pub fn eval<F: Real>(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<F>,
+        wo: Vector3<F>,
+        rng: &mut impl Draw<F>,
+        tally: &mut impl Tally<F>,
+    ) where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        if !self.links(wi, wo) {
+            return;
+        }
+        match estimator {
+            Estimator::Walk => self.eval_walk(wi, wo, rng, tally),
+            Estimator::PositionFree if I::MIRRORS => self.eval_position_free(wi, wo, rng, tally),
+            Estimator::TwoWalk | Estimator::PositionFree => self.eval_two_walk(wi, wo, rng, tally),
+        }
+    }
+
+    /// Whether light can go from `wi` to `wo` other than straight on.
+    #[inline]
+    fn links<F: Real>(&self, wi: Vector3<F>, wo: Vector3<F>) -> bool
+    where
+        I: Facets<F>,
+    {
+        let leaves = wo.z > F::zero() || (I::TRANSMITS && wo.z < F::zero());
+        wi.z > F::zero()
+            && leaves
+            && wi.is_finite()
+            && wo.is_finite()
+            && self.facets.invisible().is_none()
+    }
+}

@@ -1,0 +1,231 @@
+//! Reflectance of a smooth interface at a micro-facet.
+
+use super::{Real, Rgb};
+
+/// Reflectance of unpolarised light at a dielectric interface, and the cosine
+/// of the refracted ray: (F, cosθ_t), for the cosine `cos` ≥ 0 of incidence
+/// and the relative index `eta` = n(far side) / n(near side).
+///
+/// Under total reflection F = 1 and cosθ_t = 0. Amplitudes and cosines are
+/// formed from η² − 1 = (η − 1)(η + 1) and sin²θ = (1 − cosθ)(1 + cosθ), so
+/// that F keeps its relative precision as η → 1.
+#[inline]
+pub fn dielectric<F: Real>(cos: F, eta: F) -> (F, F) {
+    let (one, zero) = (F::one(), F::zero());
+    let excess = (eta - one) * (eta + one);
+    let eta2 = eta * eta;
+    // (η cosθ_t)² = η² − sin²θ
+    let sin2 = (one - cos) * (one + cos);
+    let q2 = if cos > F::of(0.5) {
+        eta2 - sin2
+    } else {
+        excess + cos * cos
+    };
+    if q2 <= zero {
+        // At η = 1 a grazing ray goes straight on.
+        return if excess == zero {
+            (zero, zero)
+        } else {
+            (one, zero)
+        };
+    }
+    let q = q2.sqrt();
+    let cos_t = q / eta;
+    // r_s = (cosθ − q)/(cosθ + q) and r_p = (η² cosθ − q)/(η² cosθ + q), with
+    // both numerators times their conjugates.
+    let s = cos + q;
+    let p = eta2 * cos + q;
+    let rs = excess / (s * s);
+    let rp = excess * (eta2 * cos * cos - sin2) / (p * p);
+    let f = F::of(0.5) * (rs * rs + rp * rp);
+    (f.min(one), cos_t.min(one))
+}
+
+/// Transmittance 1 − F from the cosines of both rays, which must obey Snell's
+/// law; precise where F → 1, and symmetric in the two sides.
+#[inline]
+pub fn transmittance<F: Real>(cos: F, cos_t: F, eta: F) -> F {
+    let (s, p) = (cos + eta * cos_t, eta * cos + cos_t);
+    let both = eta * cos * cos_t;
+    if both <= F::zero() {
+        return F::zero();
+    }
+    (F::of(2.0) * (both / (s * s) + both / (p * p))).min(F::one())
+}
+
+/// Reflectance of unpolarised light at a conductor with the complex index
+/// η + ik relative to the outside, for the cosine `cos` ≥ 0 of incidence.
+///
+/// The textbook form (Born and Wolf, "Principles of Optics", § 14.2) with
+/// a + ib = √((η + ik)² − sin²θ): R_s = |cosθ − (a + ib)|² / |cosθ + (a + ib)|²
+/// and R_p = R_s |(a + ib) cosθ − sin²θ|² / |(a + ib) cosθ + sin²θ|².
+#[inline]
+pub fn complex<F: Real>(cos: F, eta: F, k: F) -> F {
+    let (one, two, half) = (F::one(), F::of(2.0), F::of(0.5));
+    let sin2 = ((one - cos) * (one + cos)).max(F::zero());
+    let t = (eta - k) * (eta + k) - sin2;
+    let ab = eta * k;
+    let modulus = t.hypot(two * ab);
+    // The larger of a and b by a sum, the other from their product.
+    let (a, b) = if t >= F::zero() {
+        let a = (half * (modulus + t)).sqrt();
+        (a, if a > F::zero() { ab / a } else { F::zero() })
+    } else {
+        let b = (half * (modulus - t)).sqrt();
+        (ab / b, b)
+    };
+    let square = |x: F| x * x;
+    let ratio = |less: F, more: F| if more > F::zero() { less / more } else { one };
+    let rs = ratio(square(cos - a) + b * b, square(cos + a) + b * b);
+    let rp = rs
+        * ratio(
+            square(a * cos - sin2) + square(b * cos),
+            square(a * cos + sin2) + square(b * cos),
+        );
+    (half * (rs + rp)).min(one)
+}
+
+/// Schlick 1994: F0 + (1 − F0)(1 − cosθ)⁵.
+#[inline]
+pub fn schlick<F: Real>(cos: F, f0: F) -> F {
+    f0 + (F::one() - f0) * (F::one() - cos).max(F::zero()).powi(5)
+}
+
+/// Schlick's curve, lowered to go through the reflectance `f82` at
+/// cosθ = 1/7 (about 82°, where metals dip), clamped to [0, 1].
+///
+/// The correcting term c (1 − c)⁶ is Lazányi and Szirmay-Kalos 2005, the
+/// parameter Hoffman 2019, "Fresnel Equations Considered Harmful".
+#[inline]
+pub fn f82<F: Real>(cos: F, f0: F, f82: F) -> F {
+    let one = F::one();
+    let at = F::of(1.0 / 7.0);
+    let dip = (schlick(at, f0) - f82) / (at * (one - at).powi(6));
+    let c = (one - cos).max(F::zero());
+    (schlick(cos, f0) - dip * cos * c.powi(6))
+        .max(F::zero())
+        .min(one)
+}
+
+/// The reflectance of conductor facets, per colour channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConductorFresnel<F> {
+    /// The same at all angles.
+    Constant(Rgb<F>),
+    /// From the complex index η + ik relative to the outside.
+    Complex {
+        /// Real part of the index (dimensionless).
+        eta: Rgb<F>,
+        /// Extinction coefficient (dimensionless).
+        k: Rgb<F>,
+    },
+    /// Schlick's curve from the reflectance at normal incidence.
+    Schlick {
+        /// Reflectance at normal incidence.
+        f0: Rgb<F>,
+    },
+    /// Schlick's curve with its dip near grazing incidence.
+    F82 {
+        /// Reflectance at normal incidence.
+        f0: Rgb<F>,
+        /// Reflectance at cosθ = 1/7.
+        f82: Rgb<F>,
+    },
+}
+
+impl<F: Real> ConductorFresnel<F> {
+    /// The reflectance at the cosine `cos` ≥ 0 of incidence.
+    #[inline]
+    pub fn reflectance(&self, cos: F) -> Rgb<F> {
+        let cos = cos.min(F::one());
+        match *self {
+            Self::Constant(color) => color,
+            Self::Complex { eta, k } => {
+                Rgb(std::array::from_fn(|c| complex(cos, eta.0[c], k.0[c])))
+            }
+            Self::Schlick { f0 } => f0.map(|f0| schlick(cos, f0)),
+            Self::F82 { f0, f82: edge } => {
+                Rgb(std::array::from_fn(|c| f82(cos, f0.0[c], edge.0[c])))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dielectric_knows_its_closed_cases() {
+        // Normal incidence: ((η − 1)/(η + 1))².
+        for eta in [0.5, 1.5, 3.0, 1e-3, 1e3f64] {
+            let expected = ((eta - 1.0) / (eta + 1.0)).powi(2);
+            assert!((dielectric(1.0, eta).0 - expected).abs() < 1e-14);
+        }
+        // Brewster's angle, tanθ = η: only half of the s polarisation's R.
+        let eta = 1.5f64;
+        let cos = 1.0 / (1.0 + eta * eta).sqrt();
+        let rs = ((1.0 - eta * eta) / (1.0 + eta * eta)).powi(2);
+        assert!((dielectric(cos, eta).0 - 0.5 * rs).abs() < 1e-14);
+        // Past the critical angle, sinθ = η.
+        assert_eq!(dielectric(0.7, 1.0 / 1.5), (1.0, 0.0));
+        assert!(dielectric(0.75, 1.0 / 1.5).0 < 1.0);
+        assert!((dielectric(0.0, 1.5).0 - 1.0f64).abs() < 1e-15);
+    }
+
+    #[test]
+    fn nothing_is_lost_at_the_interface() {
+        for eta in [0.4, 0.99, 1.5, 3.0] {
+            for cos in [1e-6, 0.2, 0.95, 1.0f64] {
+                let (f, cos_t) = dielectric(cos, eta);
+                assert!(
+                    (f + transmittance(cos, cos_t, eta) - 1.0).abs() < 1e-12,
+                    "η {eta}, cos {cos}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn dielectric_is_reciprocal_and_precise_near_one() {
+        for eta in [1.0 + 1e-7, 1.0 - 1e-7, 1.01, 1.5, 2.5] {
+            for cos in [1e-3, 0.1, 0.5, 0.9] {
+                let (there, cos_t) = dielectric::<f64>(cos, eta);
+                if cos_t > 0.0 {
+                    let back = dielectric(cos_t, 1.0 / eta).0;
+                    assert!(
+                        (there - back).abs() < 1e-8 * there,
+                        "η {eta}, cos {cos}: {there} {back}"
+                    );
+                }
+            }
+        }
+        let (f, cos_t) = dielectric(0.0f32, 1.0);
+        assert_eq!((f, cos_t), (0.0, 0.0));
+        // ((η − 1)/(η + 1))² with the f32 nearest to 1 + 1e-7.
+        let eta = 1.0 + 1e-7f32;
+        let expected = (f64::from(eta) - 1.0).powi(2) / 4.0;
+        assert!((f64::from(dielectric(1.0, eta).0) / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn complex_meets_the_dielectric_and_the_mirror() {
+        for cos in [0.0, 1e-4, 0.3, 0.8, 1.0f64] {
+            let real = dielectric(cos, 1.7).0;
+            assert!((complex(cos, 1.7, 0.0) - real).abs() < 1e-13, "cos {cos}");
+            let f = complex(cos as f32, 1e-3, 1e4);
+            assert!((0.999..=1.0).contains(&f), "cos {cos}: {f}");
+        }
+        // Normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
+        let (eta, k) = (0.2f64, 3.9f64);
+        let expected = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
+        assert!((complex(1.0, eta, k) - expected).abs() < 1e-14);
+    }
+
+    #[test]
+    fn f82_goes_through_its_two_points() {
+        assert_eq!(f82(1.0, 0.7, 0.6), 0.7);
+        assert!((f82(1.0 / 7.0, 0.7, 0.6) - 0.6f64).abs() < 1e-15);
+        assert!((f82(0.0, 0.7, 0.6) - 1.0f64).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,66 @@
+//! Distributions of micro-normals.
+
+mod beckmann;
+mod ggx;
+mod quadratic;
+
+pub use beckmann::Beckmann;
+pub use ggx::Ggx;
+pub use quadratic::Quadratic;
+
+use super::{Real, Vector3};
+
+/// A distribution of micro-normals D(m) on the upper hemisphere, normalised
+/// to ∫ D(m) m_z dm = 1, whose heights and normals are independent (Smith).
+///
+/// Every function of a direction `w` holds on the whole sphere: rays inside
+/// the microsurface also go up, and then see it from below.
+pub trait Ndf<F: Real>: Copy {
+    /// D(m), sr⁻¹: the area of micro-facets with normal around m per unit of
+    /// macroscopic area and solid angle. 0 for m_z ≤ 0.
+    fn density(&self, m: Vector3<F>) -> F;
+
+    /// σ(w) = ∫ ⟨m·w⟩ D(m) dm: the area of all micro-facets that face w,
+    /// projected along w, per unit of macroscopic area. σ(w) − σ(−w) = w_z.
+    fn projected_area(&self, w: Vector3<F>) -> F;
+
+    /// Smith's Λ(w) = σ(−w) / w_z, for w_z ≥ 0 (∞ at w_z = 0).
+    #[inline]
+    fn lambda(&self, w: Vector3<F>) -> F {
+        self.projected_area(-w) / w.z
+    }
+
+    /// Smith's masking G1(w) = 1 / (1 + Λ(w)) = w_z / σ(w), for w_z ≥ 0.
+    #[inline]
+    fn masking(&self, w: Vector3<F>) -> F {
+        w.z / self.projected_area(w)
+    }
+
+    /// D_w(m) = ⟨m·w⟩ D(m) / σ(w), sr⁻¹: the density of normals seen from w.
+    #[inline]
+    fn visible_density(&self, w: Vector3<F>, m: Vector3<F>) -> F {
+        let facing = w.dot(m).max(F::zero());
+        if facing == F::zero() {
+            F::zero()
+        } else {
+            facing * self.density(m) / self.projected_area(w)
+        }
+    }
+
+    /// A unit normal with density [`Ndf::visible_density`], from two uniform
+    /// numbers in [0, 1); continuous in both. Seen from straight below
+    /// (w = −z, where σ = 0) it is the limit, a horizontal normal.
+    fn sample_visible(&self, w: Vector3<F>, u: [F; 2]) -> Vector3<F>;
+}
+
+/// Turns a vector given in the frame whose x axis is the azimuth of (x, y)
+/// back into the frame that (x, y) is given in.
+#[inline]
+fn rotate_to_azimuth<F: Real>(x: F, y: F, v: Vector3<F>) -> Vector3<F> {
+    let r = x.hypot(y);
+    if r == F::zero() {
+        return v;
+    }
+    let (cos, sin) = (x / r, y / r);
+    Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+}

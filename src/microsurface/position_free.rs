@@ -1,0 +1,184 @@
+//! Estimator 3: the two walks in directions alone, the depth integrated out.
+//!
+//! For mirrors, the phase function does not depend on depth, and the depth
+//! enters by exponentials only. Its distribution at a facet, given all
+//! directions so far, stays a mixture of sums of exponential variables, on
+//! which descending, climbing and escaping act in closed form.
+
+use super::two_walk::kept_inside;
+use super::walk::survives;
+use super::{At, Draw, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
+
+/// The distribution of the depth of a facet.
+///
+/// A chain of stages, each an exponential variable of its own rate: with
+/// probability `start` the depth is the sum of the stages from this one on.
+/// Its Laplace transform is L(s) = Σ_i start_i Π_{j ≥ i} rate_j/(s + rate_j):
+/// every term is positive, so nothing cancels.
+struct Depth<F> {
+    stages: Vec<Stage<F>>,
+}
+
+struct Stage<F> {
+    start: F,
+    rate: F,
+}
+
+impl<F: Real> Depth<F> {
+    fn new() -> Self {
+        Self {
+            stages: Vec::with_capacity(16),
+        }
+    }
+
+    /// The depth of the first collision, for light that enters at `rate`.
+    fn enter(&mut self, rate: F) {
+        self.stages.clear();
+        self.stages.push(Stage {
+            start: F::one(),
+            rate,
+        });
+    }
+
+    /// Goes down to the next collision at `rate`.
+    #[inline]
+    fn descend(&mut self, rate: F) {
+        self.stages.push(Stage {
+            start: F::zero(),
+            rate,
+        });
+    }
+
+    /// Goes up to the next collision at `rate`, given that there is one, and
+    /// returns its probability: climbing through the stages in order, each
+    /// is passed or collided in, whichever exponential is first.
+    #[inline]
+    fn climb(&mut self, rate: F) -> F {
+        let mut passing = F::zero();
+        let mut collided = F::zero();
+        for stage in &mut self.stages {
+            let here = stage.start + passing;
+            let split = (rate + stage.rate).recip();
+            stage.start = here * (rate * split);
+            passing = here * (stage.rate * split);
+            collided += stage.start;
+        }
+        if collided > F::zero() {
+            let norm = collided.recip();
+            for stage in &mut self.stages {
+                stage.start *= norm;
+            }
+        }
+        collided
+    }
+
+    /// The mean of e^{−λ·depth}: the chance to escape at the rate `lambda`.
+    #[inline]
+    fn escape(&self, lambda: F) -> F {
+        self.stages.iter().fold(F::zero(), |passing, stage| {
+            (passing + stage.start) * (stage.rate / (lambda + stage.rate))
+        })
+    }
+}
+
+impl<N, I> Microsurface<N, I> {
+    /// Estimates the value by both walks; `wi` and `wo` are known to link,
+    /// and the facets to be mirrors.
+    pub(super) fn eval_position_free<F: Real>(
+        &self,
+        wi: Vector3<F>,
+        wo: Vector3<F>,
+        rng: &mut impl Draw<F>,
+        tally: &mut impl Tally<F>,
+    ) where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        tally.add(1, self.first_order(self.entrance(wi), wo, wi));
+        let mut depth = Depth::new();
+        self.eval_directions(wi, wo, F::one(), &mut depth, rng, tally);
+        self.eval_directions(wo, wi, wo.z / wi.z, &mut depth, rng, tally);
+    }
+
+    /// The part of orders ≥ 2 that a walk from `from` finds, times `scale`.
+    fn eval_directions<F: Real>(
+        &self,
+        from: Vector3<F>,
+        to: Vector3<F>,
+        scale: F,
+        depth: &mut Depth<F>,
+        rng: &mut impl Draw<F>,
+        tally: &mut impl Tally<F>,
+    ) where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        let ndf = &self.ndf;
+        let lambda = ndf.lambda(to);
+        let sigma_to = ndf.projected_area(to);
+        let mut at = self.entrance(from);
+        depth.enter(at.sigma / from.z);
+        let mut weight = Rgb::splat(scale);
+        let mut order = 1;
+        // The density of the path as the other walk would find it, over that
+        // of this one, but for the normal of the connection and σ(ω_o):
+        // Π_{j=0}^{k−2} σ(−d_j) / (D(m_1) Π_{j=2}^{k−1} σ(d_j)).
+        let mut ratio = F::zero();
+        loop {
+            // Pick the next direction.
+            let m = ndf.sample_visible(at.w, [rng.draw(), rng.draw()]);
+            let bounce = self.facets.scatter(Side::Above, at.w, m, rng);
+            weight *= bounce.weight;
+            let d = bounce.direction;
+            let reversed = if order == 1 {
+                ndf.density(m)
+            } else {
+                ndf.projected_area(d)
+            };
+            ratio = bounded(if order == 1 {
+                at.sigma / reversed
+            } else {
+                ratio * (at.sigma / reversed)
+            });
+            if !survives(&mut weight, scale, order, rng) {
+                return;
+            }
+            // Move the depth to the next facet.
+            at = At {
+                side: Side::Above,
+                w: -d,
+                sigma: ndf.projected_area(-d),
+            };
+            let rate = at.sigma / d.z.abs();
+            // A level ray collides where it is.
+            if rate.is_finite() {
+                if d.z < F::zero() {
+                    depth.descend(rate);
+                } else {
+                    let collides = depth.climb(rate);
+                    let kept = kept_inside(collides);
+                    if rng.draw() >= kept {
+                        return;
+                    }
+                    weight = weight * (collides / kept);
+                }
+            }
+            order += 1;
+            // Connect to the far end.
+            let phase = self.facets.phase(ndf, at, to, false, m);
+            if phase.density > F::zero() {
+                // σ(w) p is D(h)/4 without Fresnel.
+                let other = ratio * (F::of(4.0) * at.sigma * phase.density / sigma_to);
+                let value = phase.density * depth.escape(lambda) / (F::one() + other);
+                tally.add(order, weight * phase.weight * value);
+            }
+        }
+    }
+}
+
+/// Keeps a product of many factors away from 0 and ∞. Weights that are this
+/// unequal are 0 and 1.
+#[inline]
+fn bounded<F: Real>(x: F) -> F {
+    x.max(F::of(1e-30)).min(F::of(1e30))
+}

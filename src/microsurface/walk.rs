@@ -1,0 +1,212 @@
+//! The walk among the micro-facets.
+
+use super::{At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
+
+/// Weights below this are played against: continuing costs more than it can
+/// bring. From [`ROULETTE_FROM`] on, so that dark surfaces keep a clean first
+/// order.
+const ROULETTE_WEIGHT: f64 = 1.0 / 16.0;
+
+/// The first order after which a dark walk plays.
+const ROULETTE_FROM: u32 = 3;
+
+/// From this order on a walk plays whatever its weight, and reaches order n
+/// with probability (LONG/n)²: the expected number of steps of any walk is
+/// below 2·LONG, and the mean is kept. Walks get here at α ≥ 10 alone.
+const LONG: u32 = 4096;
+
+/// Light on its way.
+pub(super) struct Ray<F> {
+    /// Direction of travel in the frame of `side`.
+    pub direction: Vector3<F>,
+    /// Optical depth below the top of `side`.
+    pub depth: F,
+    pub side: Side,
+}
+
+impl<F: Real> Ray<F> {
+    /// Light that enters from `wi`, before its first collision.
+    #[inline]
+    pub fn entering(wi: Vector3<F>) -> Self {
+        Self {
+            direction: -wi,
+            depth: F::zero(),
+            side: Side::Above,
+        }
+    }
+
+    /// Moves to the next collision, and returns it; `None` means that the
+    /// light left. `u` is uniform in [0, 1).
+    ///
+    /// The collision rate per unit of τ is σ(−d)/|d_z|, for d going down
+    /// (1 + Λ(−d)) and up (Λ(d)).
+    #[inline]
+    pub fn advance<N: Ndf<F>>(&mut self, ndf: &N, u: F) -> Option<At<F>> {
+        let w = -self.direction;
+        let sigma = ndf.projected_area(w);
+        // |d_z| times an exponential free path; all tests are multiplied
+        // through by |d_z|, which may be 0.
+        let climb = -(F::one() - u).ln() * w.z.abs();
+        if w.z >= F::zero() {
+            self.depth += climb / sigma;
+        } else if climb >= self.depth * sigma {
+            return None;
+        } else {
+            self.depth = (self.depth - climb / sigma).max(F::zero());
+        }
+        Some(At {
+            side: self.side,
+            w,
+            sigma,
+        })
+    }
+
+    /// Goes on as `bounce` says.
+    #[inline]
+    pub fn follow(&mut self, bounce: &Bounce<F>) {
+        if bounce.crosses {
+            self.direction = -bounce.direction;
+            self.depth = depth_from_other_side(self.depth);
+            self.side = self.side.other();
+        } else {
+            self.direction = bounce.direction;
+        }
+    }
+
+    /// A direction of the frame of [`Side::Above`] in the ray's frame, and
+    /// back.
+    #[inline]
+    pub fn localized(&self, w: Vector3<F>) -> Vector3<F> {
+        match self.side {
+            Side::Above => w,
+            Side::Below => -w,
+        }
+    }
+}
+
+/// The depth of the same height seen from the other side: C1 ↔ 1 − C1, so
+/// τ ↦ −ln(1 − e^{−τ}), its own inverse.
+#[inline]
+pub(super) fn depth_from_other_side<F: Real>(tau: F) -> F {
+    if tau > F::LN_2() {
+        -(-(-tau).exp()).ln_1p()
+    } else {
+        // A depth of 0 has an infinite counterpart; the smallest positive
+        // number has one that is finite and as unlikely.
+        -(-(-tau.max(F::min_positive_value())).exp_m1()).ln()
+    }
+}
+
+/// Russian roulette after `order` interactions of a walk that began with the
+/// weight `scale`; false ends the walk.
+#[inline]
+pub(super) fn survives<F: Real>(
+    weight: &mut Rgb<F>,
+    scale: F,
+    order: u32,
+    rng: &mut impl Draw<F>,
+) -> bool {
+    if order < ROULETTE_FROM {
+        return weight.max_channel() > F::zero();
+    }
+    let mut chance = F::one();
+    let (brightest, least) = (weight.max_channel(), F::of(ROULETTE_WEIGHT) * scale);
+    if brightest < least {
+        chance = brightest / least;
+    }
+    if order >= LONG {
+        let n = f64::from(order);
+        chance *= F::of((n / (n + 1.0)).powi(2));
+    }
+    if chance < F::one() {
+        if rng.draw() >= chance {
+            return false;
+        }
+        *weight = *weight * chance.recip();
+    }
+    true
+}
+
+impl<N, I> Microsurface<N, I> {
+    /// One walk that enters from `wi` (unit, z > 0): where it leaves, with
+    /// density ∝ f |cosθ_o| if nothing is absorbed. `None` if it was absorbed,
+    /// or if `wi` is not above the surface.
+    pub fn sample<F: Real>(&self, wi: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>>
+    where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        if !(wi.z > F::zero() && wi.is_finite()) {
+            return None;
+        }
+        if let Some(tint) = self.facets.invisible() {
+            return Some(Exit {
+                direction: -wi,
+                weight: tint,
+                order: 1,
+            });
+        }
+        let mut ray = Ray::entering(wi);
+        let mut weight = Rgb::white();
+        let mut order = 0;
+        while let Some(at) = ray.advance(&self.ndf, rng.draw()) {
+            let m = self.ndf.sample_visible(at.w, [rng.draw(), rng.draw()]);
+            let bounce = self.facets.scatter(at.side, at.w, m, rng);
+            weight *= bounce.weight;
+            order += 1;
+            ray.follow(&bounce);
+            if !survives(&mut weight, F::one(), order, rng) {
+                return None;
+            }
+        }
+        Some(Exit {
+            direction: ray.localized(ray.direction),
+            weight,
+            order,
+        })
+    }
+
+    /// Estimator 1, the paper's: at every facet the phase function towards
+    /// `wo`, times the chance e^{−Λ(ω_o) τ} to get out unhindered.
+    pub(super) fn eval_walk<F: Real>(
+        &self,
+        wi: Vector3<F>,
+        wo: Vector3<F>,
+        rng: &mut impl Draw<F>,
+        tally: &mut impl Tally<F>,
+    ) where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        let lambda = self.ndf.lambda(if wo.z > F::zero() { wo } else { -wo });
+        let mut ray = Ray::entering(wi);
+        let mut weight = Rgb::white();
+        let mut order = 0;
+        while let Some(at) = ray.advance(&self.ndf, rng.draw()) {
+            let m = self.ndf.sample_visible(at.w, [rng.draw(), rng.draw()]);
+            order += 1;
+            // Connect to the outgoing direction.
+            let o = ray.localized(wo);
+            let crosses = o.z < F::zero();
+            let phase = self.facets.phase(&self.ndf, at, o, crosses, m);
+            if phase.density > F::zero() {
+                let depth = if crosses {
+                    depth_from_other_side(ray.depth)
+                } else {
+                    ray.depth
+                };
+                tally.add(
+                    order,
+                    weight * phase.weight * (phase.density * (-lambda * depth).exp()),
+                );
+            }
+            // Walk on.
+            let bounce = self.facets.scatter(at.side, at.w, m, rng);
+            weight *= bounce.weight;
+            ray.follow(&bounce);
+            if !survives(&mut weight, F::one(), order, rng) {
+                return;
+            }
+        }
+    }
+}
