@@ -200,6 +200,13 @@ impl WalkStream {
     }
 }
 
+impl crate::microsurface::Draw<f32> for WalkStream {
+    #[inline]
+    fn draw(&mut self) -> f32 {
+        self.next_f32()
+    }
+}
+
 /// The finaliser of SplitMix64 (Steele, Lea, Flood 2014, "Fast Splittable
 /// Pseudorandom Number Generators", with the constants of Stafford's mix 13)
 /// behind one step of its counter, so that 0 is no fixed point.

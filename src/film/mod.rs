@@ -103,7 +103,7 @@ pub enum Aov {
     /// Shading normal of the first surface in world space, averaged over the
     /// samples and hence shorter than 1 at edges; 0 where there is none.
     Normal,
-    /// Distance to the first surface along the ray in metres, averaged over the
+    /// Distance to the first surface along the view axis in metres, averaged over the
     /// samples that have one; 1e10, as in Blender, where none has.
     Depth,
     /// Variance of the pixel's mean colour, see [`FilmTile::variance`].

@@ -105,16 +105,29 @@ impl OutputPath {
     /// # Errors
     /// When the system refuses; a file that was there before stays.
     pub fn write(&self, image: &Image, exposure: f32) -> Result<(), OutputError> {
-        replace(&self.path, |file| match self.format {
-            Format::Exr => exr::encode(image, file).map_err(|error| error.to_string()),
+        match self.format {
+            Format::Exr => replace(&self.path, |file| {
+                exr::encode(image, file).map_err(|error| error.to_string())
+            }),
             Format::Png => {
-                use ::image::ImageEncoder;
-                let pixels = image.to_srgb8(exposure);
-                let [width, height] = [image.window.width, image.window.height];
-                ::image::codecs::png::PngEncoder::new(file)
-                    .write_image(&pixels, width, height, ::image::ExtendedColorType::Rgb8)
-                    .map_err(|error| error.to_string())
+                let size = [image.window.width, image.window.height];
+                self.write_rgb8(&image.to_srgb8(exposure), size)
             }
+        }
+    }
+
+    /// Writes 8-bit sRGB of the given width and height as PNG, whatever the
+    /// extension.
+    ///
+    /// # Errors
+    /// When the system refuses; a file that was there before stays.
+    pub fn write_rgb8(&self, pixels: &[u8], size: [u32; 2]) -> Result<(), OutputError> {
+        use ::image::ImageEncoder;
+        let [width, height] = size;
+        replace(&self.path, |file| {
+            ::image::codecs::png::PngEncoder::new(file)
+                .write_image(pixels, width, height, ::image::ExtendedColorType::Rgb8)
+                .map_err(|error| error.to_string())
         })
     }
 }

@@ -167,6 +167,24 @@ impl Texture {
         value
     }
 
+    /// Linear red, green and blue, averaged over all pixels.
+    pub fn mean(&self) -> [f32; 3] {
+        let Image { width, height, .. } = self.image;
+        let mut sum = [0.0f64; 3];
+        for y in 0..height {
+            for x in 0..width {
+                let texel = self.image.texel(x, y);
+                for (sum, &value) in sum.iter_mut().zip(&texel) {
+                    *sum += f64::from(match self.color_space {
+                        ColorSpace::Srgb => srgb_to_linear(value),
+                        ColorSpace::Linear | ColorSpace::NonColor => value,
+                    });
+                }
+            }
+        }
+        sum.map(|sum| (sum / (width * height).max(1) as f64) as f32)
+    }
+
     /// One channel of [`Texture::sample`].
     pub fn channel(&self, uv: [f32; 2], channel: Channel) -> f32 {
         let [r, g, b, a] = self.sample(uv);
