@@ -15,6 +15,7 @@
 
 pub mod bsdf;
 pub mod camera;
+pub mod color;
 pub mod description;
 pub mod embree;
 pub mod film;

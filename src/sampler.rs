@@ -1,1 +1,485 @@
-//! Sampler.
+//! Random numbers of a path: Owen-scrambled Sobol points for the choices that
+//! every path makes, and a PCG stream behind them for walks of unknown length.
+//!
+//! Every number has an address, a [`Dimension`]. Who leaves out a feature
+//! skips its addresses and shifts nobody else's, so an integrator specialised
+//! to a scene draws exactly what the general one does.
+//!
+//! Dimensions come in sets of four, stratified jointly. Each set is the first
+//! four dimensions of Sobol's sequence under a scramble of its own ("padding",
+//! Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4), section 5).
+//! The first dimensions have the best two-dimensional projections at the low
+//! sample counts of a pixel, and a path may be as long as it likes.
+
+use rand::Rng;
+use rand_pcg::Pcg32;
+use sobol_burley::parts::{owen_scramble_rev, u32_to_f32_norm};
+
+/// Length of the Sobol sequence as a power of two; later samples start another
+/// one, scrambled afresh.
+const LOG2_SEQUENCE: u32 = 16;
+
+/// Sets of dimensions that belong to the camera.
+const CAMERA_SETS: u32 = 1;
+/// Sets of dimensions that belong to each path vertex: light and closure,
+/// BSDF, roulette, and the walk of a light connection.
+const VERTEX_SETS: u32 = 4;
+
+/// The address of a random number within a sample.
+///
+/// `bounce` counts path vertices: 0 is where the camera ray lands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dimension {
+    /// Which four jointly stratified numbers.
+    set: u32,
+    /// The first of them that is meant.
+    lane: usize,
+}
+
+impl Dimension {
+    const fn vertex(bounce: u32, set: u32, lane: usize) -> Self {
+        Self {
+            set: CAMERA_SETS + bounce * VERTEX_SETS + set,
+            lane,
+        }
+    }
+
+    /// Position within the pixel filter, two numbers.
+    pub const fn camera_pixel() -> Self {
+        Self { set: 0, lane: 0 }
+    }
+
+    /// Position on the lens, two numbers.
+    pub const fn lens() -> Self {
+        Self { set: 0, lane: 2 }
+    }
+
+    /// Which light to connect to, one number.
+    pub const fn light_choice(bounce: u32) -> Self {
+        Self::vertex(bounce, 0, 0)
+    }
+
+    /// Where on that light, two numbers.
+    pub const fn light_position(bounce: u32) -> Self {
+        Self::vertex(bounce, 0, 1)
+    }
+
+    /// Which closure of a mix to sample, one number.
+    pub const fn closure_choice(bounce: u32) -> Self {
+        Self::vertex(bounce, 0, 3)
+    }
+
+    /// Direction to leave in, four numbers. They are also the leading numbers
+    /// of the [`Purpose::Sample`] walk of that vertex: a closure either has a
+    /// closed-form sampler or walks.
+    pub const fn bsdf(bounce: u32) -> Self {
+        Self::vertex(bounce, 1, 0)
+    }
+
+    /// Whether the path goes on, one number.
+    pub const fn roulette(bounce: u32) -> Self {
+        Self::vertex(bounce, 2, 0)
+    }
+}
+
+/// What a microsurface walk at a path vertex is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Sampling the direction in which the path goes on.
+    Sample,
+    /// Evaluating the BSDF towards a light.
+    Light,
+}
+
+/// The random numbers of one sample of one pixel.
+///
+/// All numbers are in [0, 1) and depend on the seed, the pixel, the sample and
+/// the dimension, and on nothing else: neither the order nor the number of
+/// requests matters.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    /// Hash of seed and pixel, and of the sequence when there is a second one.
+    key: u64,
+    /// Index into the Sobol sequence.
+    index: u32,
+    /// The set evaluated last, and its numbers. Neighbouring requests share
+    /// one: evaluating four dimensions costs as much as one.
+    cached_set: u32,
+    cached: [f32; 4],
+}
+
+impl Sampler {
+    /// Starts sample number `sample` of `pixel` (column, row, from the top
+    /// left of the full image, so that a crop shows the same noise).
+    pub fn new(seed: u64, pixel: [u32; 2], sample: u32) -> Self {
+        let pixel = u64::from(pixel[0]) | u64::from(pixel[1]) << 32;
+        let sequence = u64::from(sample >> LOG2_SEQUENCE);
+        Self {
+            key: mix(mix(mix(seed) ^ pixel).wrapping_add(sequence)),
+            index: sample & ((1 << LOG2_SEQUENCE) - 1),
+            cached_set: u32::MAX,
+            cached: [0.0; 4],
+        }
+    }
+
+    /// One number in [0, 1).
+    #[inline]
+    pub fn get_1d(&mut self, dimension: Dimension) -> f32 {
+        self.set(dimension.set)[dimension.lane]
+    }
+
+    /// Two jointly stratified numbers in [0, 1).
+    ///
+    /// # Panics
+    /// If `dimension` is the last of its set; none of those that are said to
+    /// have two numbers is.
+    #[inline]
+    pub fn get_2d(&mut self, dimension: Dimension) -> [f32; 2] {
+        let set = self.set(dimension.set);
+        [set[dimension.lane], set[dimension.lane + 1]]
+    }
+
+    /// The four jointly stratified numbers of the set that `dimension` is in,
+    /// in [0, 1).
+    #[inline]
+    pub fn get_4d(&mut self, dimension: Dimension) -> [f32; 4] {
+        self.set(dimension.set)
+    }
+
+    /// The stream of a microsurface walk at vertex `bounce`: four stratified
+    /// numbers, and any number of independent ones after them.
+    #[inline]
+    pub fn walk_stream(&mut self, bounce: u32, purpose: Purpose) -> WalkStream {
+        let set = match purpose {
+            Purpose::Sample => Dimension::bsdf(bounce).set,
+            Purpose::Light => Dimension::vertex(bounce, 3, 0).set,
+        };
+        let tail_key = self.set_key(set) ^ u64::from(self.index) << 32;
+        WalkStream {
+            lead: self.set(set),
+            drawn: 0,
+            tail: Pcg32::new(mix(tail_key), self.key),
+        }
+    }
+
+    #[inline]
+    fn set(&mut self, set: u32) -> [f32; 4] {
+        if self.cached_set != set {
+            self.cached = sobol_4d(self.index, self.set_key(set));
+            self.cached_set = set;
+        }
+        self.cached
+    }
+
+    #[inline]
+    fn set_key(&self, set: u32) -> u64 {
+        mix(self.key.wrapping_add(u64::from(set)))
+    }
+}
+
+/// The random numbers of one microsurface walk, in [0, 1).
+#[derive(Clone, Debug)]
+pub struct WalkStream {
+    /// The stratified numbers that come first.
+    lead: [f32; 4],
+    /// How many of them are used up.
+    drawn: usize,
+    tail: Pcg32,
+}
+
+impl WalkStream {
+    /// The next number, with 23 random bits or more; never 1.
+    #[inline]
+    pub fn next_f32(&mut self) -> f32 {
+        if let Some(&lead) = self.lead.get(self.drawn) {
+            self.drawn += 1;
+            return lead;
+        }
+        // The 24 bits that a f32 below 1 can hold, hence never rounded up to 1.
+        (self.tail.next_u32() >> 8) as f32 * (1.0 / (1 << 24) as f32)
+    }
+}
+
+impl crate::microsurface::Draw<f32> for WalkStream {
+    #[inline]
+    fn draw(&mut self) -> f32 {
+        self.next_f32()
+    }
+}
+
+/// Four dimensions of sample `index` < 2¹⁶ of the Sobol sequence scrambled by
+/// `key`, in [0, 1).
+///
+/// Bits are in reverse order, as the hash that stands for Owen's scrambling
+/// wants them. The index is scrambled too, which shuffles the sequence but keeps
+/// any 2^k first samples together with their strata, so that sets of different
+/// keys are independent.
+#[inline]
+fn sobol_4d(index: u32, key: u64) -> [f32; 4] {
+    let scrambles = [mix(key ^ 1), mix(key ^ 2)].map(|bits| [bits as u32, (bits >> 32) as u32]);
+    let index = owen_scramble_rev(index.reverse_bits(), (key >> 32) as u32);
+    let mut point = [0; 4];
+    for (nibble, vectors) in VECTORS.iter().enumerate() {
+        let terms = vectors[(index >> (28 - 4 * nibble)) as usize & 15];
+        for (point, term) in point.iter_mut().zip(terms) {
+            *point ^= term;
+        }
+    }
+    let scrambles = scrambles.as_flattened();
+    [0, 1, 2, 3]
+        .map(|lane| u32_to_f32_norm(owen_scramble_rev(point[lane], scrambles[lane]).reverse_bits()))
+}
+
+/// The sums (XOR) of direction vectors that belong to each value of each four
+/// bits of a reversed 16-bit index, for four dimensions at a time. Adding up one
+/// bit at a time takes several times as long, for want of predictable branches.
+static VECTORS: [[[u32; 4]; 16]; LOG2_SEQUENCE as usize / 4] = {
+    let mut sums = [[[0; 4]; 16]; LOG2_SEQUENCE as usize / 4];
+    let mut dimension = 0;
+    while dimension < 4 {
+        let vectors = direction_vectors(DIRECTIONS[dimension]);
+        let mut bit = 0;
+        while bit < LOG2_SEQUENCE as usize {
+            let mut value = 0;
+            while value < 16 {
+                // The first bit of a reversed index is its highest.
+                if value >> (3 - bit % 4) & 1 == 1 {
+                    sums[bit / 4][value][dimension] ^= vectors[bit].reverse_bits();
+                }
+                value += 1;
+            }
+            bit += 1;
+        }
+        dimension += 1;
+    }
+    sums
+};
+
+/// Degree, inner coefficients of the primitive polynomial, and initial direction
+/// numbers of Sobol's first dimensions (Joe and Kuo 2008, "Constructing Sobol
+/// Sequences with Better Two-Dimensional Projections", SIAM J. Sci. Comput.
+/// 30(5)). The first dimension has none: van der Corput's sequence.
+const DIRECTIONS: [(usize, u32, [u32; 3]); 4] = [
+    (0, 0, [0; 3]),
+    (1, 0, [1, 0, 0]),
+    (2, 1, [1, 3, 0]),
+    (3, 1, [1, 3, 1]),
+];
+
+/// Direction vectors v₁ … v₁₆ as binary fractions, from their recurrence.
+const fn direction_vectors(
+    (degree, coefficients, initial): (usize, u32, [u32; 3]),
+) -> [u32; LOG2_SEQUENCE as usize] {
+    let mut vectors = [0; LOG2_SEQUENCE as usize];
+    let mut k = 0;
+    while k < vectors.len() {
+        vectors[k] = if degree == 0 {
+            1 << (31 - k)
+        } else if k < degree {
+            initial[k] << (31 - k)
+        } else {
+            let mut vector = vectors[k - degree] ^ vectors[k - degree] >> degree;
+            let mut term = 1;
+            while term < degree {
+                if coefficients >> (degree - 1 - term) & 1 == 1 {
+                    vector ^= vectors[k - term];
+                }
+                term += 1;
+            }
+            vector
+        };
+        k += 1;
+    }
+    vectors
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014, "Fast Splittable
+/// Pseudorandom Number Generators", with the constants of Stafford's mix 13)
+/// behind one step of its counter, so that 0 is no fixed point.
+#[inline]
+const fn mix(x: u64) -> u64 {
+    let mut x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every dimension of the first two vertices, by name.
+    fn layout() -> Vec<(Dimension, usize)> {
+        let mut all = vec![(Dimension::camera_pixel(), 2), (Dimension::lens(), 2)];
+        for bounce in 0..2 {
+            all.push((Dimension::light_choice(bounce), 1));
+            all.push((Dimension::light_position(bounce), 2));
+            all.push((Dimension::closure_choice(bounce), 1));
+            all.push((Dimension::bsdf(bounce), 4));
+            all.push((Dimension::roulette(bounce), 1));
+        }
+        all
+    }
+
+    /// The first number of a walk behind the stratified ones.
+    fn tail_start(mut walk: WalkStream) -> f32 {
+        walk.drawn = walk.lead.len();
+        walk.next_f32()
+    }
+
+    #[test]
+    fn dimensions_do_not_overlap() {
+        let mut seen = std::collections::HashSet::new();
+        for (dimension, count) in layout() {
+            for lane in dimension.lane..dimension.lane + count {
+                assert!(lane < 4, "{dimension:?} runs out of its set");
+                assert!(seen.insert((dimension.set, lane)), "{dimension:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_do_not_depend_on_the_order_of_requests() {
+        let numbers = |order: &mut dyn Iterator<Item = (Dimension, usize)>| {
+            let mut sampler = Sampler::new(7, [3, 5], 11);
+            let mut found: Vec<_> = order
+                .map(|(d, _)| {
+                    sampler.walk_stream(0, Purpose::Light).next_f32();
+                    (d.set, d.lane, sampler.get_1d(d).to_bits())
+                })
+                .collect();
+            found.sort_unstable();
+            found
+        };
+        let forward = numbers(&mut layout().into_iter());
+        assert_eq!(forward, numbers(&mut layout().into_iter().rev()));
+        let only_roulette = Sampler::new(7, [3, 5], 11).get_1d(Dimension::roulette(1));
+        assert!(forward.iter().any(|f| f.2 == only_roulette.to_bits()));
+    }
+
+    /// Any 2^k first samples fall into the 2^k strata of each dimension, and of
+    /// the elementary boxes of each pair that must be stratified jointly.
+    #[test]
+    fn first_samples_are_stratified() {
+        const N: usize = 64;
+        for (dimension, count) in layout() {
+            let mut strata = [false; N];
+            let mut boxes = [false; N];
+            for sample in 0..N as u32 {
+                let mut sampler = Sampler::new(1, [17, 4], sample);
+                strata[(sampler.get_1d(dimension) * N as f32) as usize] = true;
+                if count >= 2 && dimension.lane == 0 {
+                    let [x, y] = sampler.get_2d(dimension);
+                    boxes[(x * 8.0) as usize * 8 + (y * 8.0) as usize] = true;
+                }
+            }
+            assert!(strata.iter().all(|&hit| hit), "{dimension:?}");
+            // Sobol's dimensions 0 and 1 form a (0, 2)-sequence.
+            if count >= 2 && dimension.lane == 0 {
+                assert!(boxes.iter().all(|&hit| hit), "{dimension:?}");
+            }
+        }
+    }
+
+    /// Past 2^16 samples comes another sequence, not the first one again.
+    #[test]
+    fn a_second_sequence_follows() {
+        let d = Dimension::bsdf(0);
+        for sample in 0..32 {
+            let first = Sampler::new(1, [0, 0], sample).get_4d(d);
+            let second = Sampler::new(1, [0, 0], sample + (1 << 16)).get_4d(d);
+            assert_ne!(first, second);
+        }
+    }
+
+    /// Correlations between what should be independent: neighbouring pixels,
+    /// seeds, sets, and walks of different purpose. Each statistic is a mean
+    /// of n products of centred uniforms, normal with variance 1/(144 n); the
+    /// bound of 5σ is passed by chance with probability 6e-7 each, fewer than
+    /// 1e-5 for all of them.
+    #[test]
+    fn neighbours_are_uncorrelated() {
+        const N: u32 = 40_000;
+        type Pair = fn(u32) -> [f32; 2];
+        let pairs: [(&str, Pair); 6] = [
+            ("pixels in a row", |i| {
+                [i, i + 1].map(|x| Sampler::new(1, [x, 9], 0).get_1d(Dimension::lens()))
+            }),
+            ("pixels in a column", |i| {
+                [i, i + 1].map(|y| Sampler::new(1, [9, y], 0).get_1d(Dimension::lens()))
+            }),
+            ("seeds", |i| {
+                [0, 1].map(|s| Sampler::new(s, [i, 2], 3).get_1d(Dimension::bsdf(1)))
+            }),
+            ("vertices", |i| {
+                [0, 1].map(|b| Sampler::new(1, [i, 2], 3).get_1d(Dimension::bsdf(b)))
+            }),
+            ("purposes", |i| {
+                [Purpose::Sample, Purpose::Light]
+                    .map(|p| tail_start(Sampler::new(1, [i, 2], 3).walk_stream(0, p)))
+            }),
+            ("tails of samples", |i| {
+                [2 * i, 2 * i + 1]
+                    .map(|s| tail_start(Sampler::new(1, [0, 0], s).walk_stream(0, Purpose::Sample)))
+            }),
+        ];
+        let bound = 5.0 / (144.0 * f64::from(N)).sqrt();
+        for (name, pair) in pairs {
+            let sum: f64 = (0..N)
+                .map(|i| {
+                    let [a, b] = pair(i).map(|u| f64::from(u) - 0.5);
+                    a * b
+                })
+                .sum();
+            let mean = sum / f64::from(N);
+            assert!(mean.abs() < bound, "{name}: {mean:.2e}, bound {bound:.2e}");
+        }
+    }
+
+    /// Mean and variance of the PCG tail, and the range of both parts. The
+    /// mean of n uniforms has σ = 1/√(12 n), that of their squares
+    /// √(4/45/n); the bound is 5σ, chance 6e-7 each.
+    #[test]
+    fn walks_draw_uniforms() {
+        const STREAMS: u32 = 1000;
+        const DRAWS: u32 = 200;
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for pixel in 0..STREAMS {
+            let mut stream = Sampler::new(3, [pixel, 0], 0).walk_stream(2, Purpose::Sample);
+            let lead = Sampler::new(3, [pixel, 0], 0).get_4d(Dimension::bsdf(2));
+            assert_eq!(lead, [0; 4].map(|_| stream.next_f32()));
+            for _ in 0..DRAWS {
+                let u = stream.next_f32();
+                assert!((0.0..1.0).contains(&u));
+                sum += f64::from(u);
+                squares += f64::from(u) * f64::from(u);
+            }
+        }
+        let n = f64::from(STREAMS * DRAWS);
+        assert!((sum / n - 0.5).abs() < 5.0 / (12.0 * n).sqrt());
+        assert!((squares / n - 1.0 / 3.0).abs() < 5.0 * (4.0 / 45.0 / n).sqrt());
+    }
+
+    /// The points before scrambling, against an independent implementation.
+    #[test]
+    fn direction_vectors_are_sobols() {
+        for index in (0..1 << 16).step_by(37) {
+            let reversed = (index as u32).reverse_bits();
+            for dimension in 0..4 {
+                let nibbles = VECTORS.iter().enumerate();
+                let terms =
+                    nibbles.map(|(i, v)| v[(reversed >> (28 - 4 * i)) as usize & 15][dimension]);
+                let expected = sobol_burley::parts::sobol_rev(reversed, dimension as u32);
+                let found = terms.fold(0, |sum, term| sum ^ term);
+                assert_eq!(found, expected, "sample {index}, dimension {dimension}");
+            }
+        }
+    }
+
+    /// The largest words that Sobol and PCG can give stay below 1.
+    #[test]
+    fn the_largest_number_is_below_one() {
+        assert!((u32::MAX >> 8) as f32 * (1.0 / (1 << 24) as f32) < 1.0);
+        assert!(u32_to_f32_norm(u32::MAX) < 1.0);
+    }
+}

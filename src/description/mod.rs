@@ -1,1 +1,253 @@
-//! (see the crate's front page)
+//! What a scene file says, before anything is looked up or converted.
+//!
+//! Names are still strings, angles still degrees and powers still watts; the
+//! format itself is described in `docs/scene-format.md`.
+
+mod camera;
+mod document;
+mod light;
+mod material;
+mod overrides;
+mod problem;
+mod read;
+mod settings;
+mod transform;
+mod validate;
+mod value;
+
+pub use camera::{
+    Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
+};
+pub use light::{AreaShape, Light, LightKind};
+pub use material::{
+    Axis, Conductor, Dielectric, Diffuse, Distribution, Emission, Material, MaterialRef, Metal,
+    Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Tangent, Transparent,
+};
+pub use problem::{Problem, Problems};
+pub use settings::{Aov, Estimator, Film, Filter, LightUnits, Sampling, World};
+pub use transform::Transform;
+pub use value::{Channel, Color, Scalar};
+
+use problem::Sources;
+
+use crate::texture::{ColorSpace, Interpolation};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A whole scene file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// The version of the format; 1 is the only one so far.
+    #[serde(rename = "smithwalk")]
+    pub version: u32,
+    /// How the watts of lights become radiance.
+    #[serde(default)]
+    pub light_units: LightUnits,
+    /// The camera; only rendering needs one.
+    pub camera: Option<Camera>,
+    /// The image.
+    #[serde(default)]
+    pub film: Film,
+    /// How many paths, how long, and by which estimator.
+    #[serde(default)]
+    pub sampling: Sampling,
+    /// What surrounds the scene; black when absent.
+    pub world: Option<World>,
+    /// Image textures by name.
+    #[serde(default)]
+    pub textures: BTreeMap<String, Texture>,
+    /// Materials by name.
+    #[serde(default)]
+    pub materials: BTreeMap<String, Material>,
+    /// Meshes by name.
+    #[serde(default)]
+    pub meshes: BTreeMap<String, Mesh>,
+    /// Instances of meshes.
+    #[serde(default)]
+    pub objects: Vec<Object>,
+    /// Lights other than emissive meshes.
+    #[serde(default)]
+    pub lights: Vec<Light>,
+    /// The directory that the file's relative paths start from.
+    #[serde(skip)]
+    pub directory: PathBuf,
+}
+
+impl Description {
+    /// Reads a scene file and replaces the values that `overrides` (dotted
+    /// path, YAML) name.
+    ///
+    /// # Errors
+    /// All that is wrong with the file and the overrides, in types, ranges
+    /// and references alike; files that the scene names are not opened.
+    pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, Problems> {
+        let name = path.display().to_string();
+        let whole = |message| Problems::new(vec![Problem::of_source(&name, message)]);
+        let bytes = std::fs::read(path)
+            .map_err(|error| whole(format!("the scene can't be read: {error}")))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = error.utf8_error().valid_up_to();
+            let line = error.as_bytes()[..valid]
+                .iter()
+                .filter(|&&byte| byte == b'\n')
+                .count()
+                + 1;
+            whole(format!("expected UTF-8, found other bytes in line {line}"))
+        })?;
+        let mut description = Self::from_str(&text, &name, overrides)?;
+        description.directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(description)
+    }
+
+    /// As [`Description::load`], with paths relative to the working directory.
+    ///
+    /// # Errors
+    /// As [`Description::load`]; `source_name` stands for the file's name.
+    pub fn from_str(
+        text: &str,
+        source_name: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, Problems> {
+        let mut sources = Sources::default();
+        let source = sources.add(source_name, text);
+        let tree = document::parse(text, source, 0, &mut sources);
+        let Some(mut tree) = tree else {
+            if sources.count() == 0 {
+                sources.report_whole(source, "the scene is empty");
+            }
+            return Err(sources.into_problems());
+        };
+        for (path, value) in overrides {
+            overrides::apply(&mut tree, path, value, &mut sources);
+        }
+        let description = read::read::<Self>(&mut tree, &mut sources);
+        if let Some(description) = &description {
+            validate::description(description, &tree, &mut sources);
+        }
+        match description {
+            Some(description) if sources.count() == 0 => Ok(description),
+            _ => Err(sources.into_problems()),
+        }
+    }
+
+    /// The path of a file that the description names.
+    pub fn resolve_path(&self, file: &Path) -> PathBuf {
+        self.directory.join(file)
+    }
+}
+
+impl Material {
+    /// Reads a single material, which can name neither textures nor other
+    /// materials.
+    ///
+    /// # Errors
+    /// All that is wrong with the text.
+    pub fn from_yaml(text: &str) -> Result<Self, Problems> {
+        let mut sources = Sources::default();
+        let source = sources.add("material", text);
+        let Some(mut tree) = document::parse(text, source, 0, &mut sources) else {
+            if sources.count() == 0 {
+                sources.report_whole(source, "the material is empty");
+            }
+            return Err(sources.into_problems());
+        };
+        let material = read::read::<Self>(&mut tree, &mut sources);
+        if let Some(material) = &material {
+            validate::material(material, &tree, &mut sources);
+        }
+        match material {
+            Some(material) if sources.count() == 0 => Ok(material),
+            _ => Err(sources.into_problems()),
+        }
+    }
+}
+
+/// An image and how it is looked up.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Texture {
+    /// The image file, relative to the scene file.
+    pub file: PathBuf,
+    /// How stored values become linear ones.
+    #[serde(default)]
+    pub color_space: ColorSpace,
+    /// What happens between pixel centres.
+    #[serde(default)]
+    pub interpolation: Interpolation,
+    /// The factors that multiply u and v.
+    #[serde(default = "value::ones")]
+    pub scale: [f32; 2],
+    /// What is then added to u and v.
+    #[serde(default)]
+    pub offset: [f32; 2],
+}
+
+/// A mesh file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mesh {
+    /// The Wavefront OBJ file, relative to the scene file.
+    pub file: PathBuf,
+}
+
+/// One instance of a mesh.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "RawObject")]
+pub struct Object {
+    /// A name for messages.
+    pub name: Option<String>,
+    /// The name of the mesh.
+    pub mesh: String,
+    /// Which faces get which material.
+    pub materials: Assignment,
+    /// From the mesh's space to the world's.
+    pub transform: Transform,
+    /// Whether camera rays see the object.
+    pub visible_to_camera: bool,
+}
+
+/// Which faces of an object get which material.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Assignment {
+    /// All faces have the material of this name.
+    All(String),
+    /// From the OBJ's `usemtl` name to the name of a material.
+    BySlot(BTreeMap<String, String>),
+    /// The OBJ's `usemtl` names are names of materials.
+    FromMesh,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawObject {
+    name: Option<String>,
+    mesh: String,
+    material: Option<String>,
+    materials: Option<BTreeMap<String, String>>,
+    #[serde(default)]
+    transform: Transform,
+    #[serde(default = "value::yes")]
+    visible_to_camera: bool,
+}
+
+impl TryFrom<RawObject> for Object {
+    type Error = value::Clash;
+
+    fn try_from(raw: RawObject) -> Result<Self, value::Clash> {
+        let materials = match (raw.material, raw.materials) {
+            (Some(_), Some(_)) => return Err(value::Clash::between("material", "materials")),
+            (Some(name), None) => Assignment::All(name),
+            (None, Some(by_slot)) => Assignment::BySlot(by_slot),
+            (None, None) => Assignment::FromMesh,
+        };
+        Ok(Self {
+            name: raw.name,
+            mesh: raw.mesh,
+            materials,
+            transform: raw.transform,
+            visible_to_camera: raw.visible_to_camera,
+        })
+    }
+}

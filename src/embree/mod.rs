@@ -1,1 +1,18 @@
-//! (see the crate's front page)
+//! Intel Embree 4 behind a safe interface: the only unsafe code of the crate.
+//!
+//! A [`Device`] opens the library, [`Accelerator`] is a committed two-level
+//! scene of triangle meshes and instances that answers [`Accelerator::intersect`]
+//! and [`Accelerator::occluded`] from any number of threads.
+//!
+//! The bindings carry the headers of Embree 4.2. Since 4.3 the library's hit
+//! record has one more field than theirs, which Embree writes; every hit that
+//! is passed to it here is padded for that (see `ray.rs`).
+#![allow(unsafe_code)]
+
+mod device;
+mod ray;
+mod scene;
+
+pub use device::{Device, EmbreeError};
+pub use ray::{Hit, Ray};
+pub use scene::{Accelerator, Geometry, SharedMesh, Vertices};

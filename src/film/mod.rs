@@ -1,1 +1,422 @@
-//! (see the crate's front page)
+//! From samples to image files.
+//!
+//! A [`Film`] is a list of [`FilmTile`]s. A tile owns its pixels' accumulators,
+//! and a sample counts for the one pixel it was taken in, because pixel filters
+//! are importance-sampled ([`PixelFilter`]) and not splatted. Threads that take
+//! whole tiles from [`Film::tiles_mut`] therefore need no locks, and since the
+//! samples of a pixel are added in order, the sums have the same bits for any
+//! number of threads.
+//!
+//! [`Film::develop`] turns sums into an [`Image`], which [`OutputPath`] writes
+//! as EXR or PNG and [`read_exr`] reads back.
+
+mod exr;
+mod filter;
+mod image;
+mod noise;
+mod output;
+mod resume;
+mod tile;
+
+pub use exr::{ExrError, read_exr};
+pub use filter::PixelFilter;
+pub use image::{Image, Layer};
+pub use output::{OutputError, OutputPath};
+pub use resume::{ResumeError, sidecar_path};
+pub use tile::{Fault, FaultCount, FilmTile, Sample};
+
+/// Side of a tile in pixels: small enough to share out evenly among threads,
+/// large enough that neighbours in memory are worked on by one thread.
+const TILE_SIZE: u32 = 16;
+
+/// A rectangle of pixels; columns count to the right and rows downwards, from
+/// the top left of the full image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Number of columns.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+}
+
+impl Window {
+    /// All of an image of the given width and height in pixels.
+    pub const fn full(resolution: [u32; 2]) -> Self {
+        Self {
+            x: 0,
+            y: 0,
+            width: resolution[0],
+            height: resolution[1],
+        }
+    }
+
+    /// Number of pixels.
+    pub const fn area(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// The pixels, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let Self {
+            x,
+            y,
+            width,
+            height,
+        } = *self;
+        (y..y + height).flat_map(move |row| (x..x + width).map(move |column| [column, row]))
+    }
+
+    /// The pixels in both windows, if there are any.
+    pub fn intersect(&self, other: Self) -> Option<Self> {
+        let overlap = |a: u32, a_size: u32, b: u32, b_size: u32| {
+            let start = a.max(b);
+            let end = (a + a_size).min(b + b_size);
+            (end > start).then(|| (start, end - start))
+        };
+        let (x, width) = overlap(self.x, self.width, other.x, other.width)?;
+        let (y, height) = overlap(self.y, self.height, other.y, other.height)?;
+        Some(Self {
+            x,
+            y,
+            width,
+            height,
+        })
+    }
+
+    /// Where `pixel` comes in the order of [`Self::pixels`].
+    fn index(&self, pixel: [u32; 2]) -> usize {
+        debug_assert!(self.x <= pixel[0] && pixel[0] - self.x < self.width);
+        debug_assert!(self.y <= pixel[1] && pixel[1] - self.y < self.height);
+        (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
+    }
+}
+
+/// An arbitrary output variable: a layer of the image beside its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Aov {
+    /// Directional albedo of the first surface, in [0, 1]; 0 where there is none.
+    Albedo,
+    /// Shading normal of the first surface in world space, averaged over the
+    /// samples and hence shorter than 1 at edges; 0 where there is none.
+    Normal,
+    /// Distance to the first surface along the view axis in metres, averaged over the
+    /// samples that have one; 1e10, as in Blender, where none has.
+    Depth,
+    /// Variance of the pixel's mean colour, see [`FilmTile::variance`].
+    Variance,
+    /// The part of the colour that met no microsurface more than once per
+    /// surface interaction.
+    Single,
+    /// The rest: what multiple scattering within microsurfaces adds.
+    Multiple,
+}
+
+impl Aov {
+    /// All of them, in the order of their layers.
+    pub const ALL: [Self; 6] = [
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Variance,
+        Self::Single,
+        Self::Multiple,
+    ];
+
+    /// The name in scene files and of the layer in EXR files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Normal => "normal",
+            Self::Depth => "depth",
+            Self::Variance => "variance",
+            Self::Single => "single",
+            Self::Multiple => "multiple",
+        }
+    }
+
+    /// Names of its channels in EXR files.
+    const fn channels(self) -> &'static [&'static str] {
+        match self {
+            Self::Normal => &["X", "Y", "Z"],
+            Self::Depth => &["Z"],
+            Self::Albedo | Self::Variance | Self::Single | Self::Multiple => &["R", "G", "B"],
+        }
+    }
+}
+
+/// The AOVs that were asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AovSet(u8);
+
+impl AovSet {
+    /// No AOVs: the colour alone.
+    pub const NONE: Self = Self(0);
+
+    /// Whether `aov` was asked for.
+    pub const fn contains(self, aov: Aov) -> bool {
+        self.0 & (1 << aov as u8) != 0
+    }
+
+    /// Those asked for, in the order of [`Aov::ALL`].
+    pub fn iter(self) -> impl Iterator<Item = Aov> {
+        Aov::ALL.into_iter().filter(move |&aov| self.contains(aov))
+    }
+}
+
+impl FromIterator<Aov> for AovSet {
+    fn from_iter<I: IntoIterator<Item = Aov>>(aovs: I) -> Self {
+        Self(aovs.into_iter().fold(0, |bits, aov| bits | 1 << aov as u8))
+    }
+}
+
+/// The accumulators of an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Width and height of the full image in pixels.
+    resolution: [u32; 2],
+    /// The part of it that is rendered.
+    window: Window,
+    aovs: AovSet,
+    /// In rows of tiles, left to right; tiles at the right and the bottom may
+    /// be cut off.
+    tiles: Vec<FilmTile>,
+}
+
+impl Film {
+    /// An empty film for `window` of an image of `resolution` (width, height).
+    ///
+    /// # Panics
+    /// If `window` reaches beyond the image.
+    pub fn new(resolution: [u32; 2], window: Window, aovs: AovSet) -> Self {
+        let reaches =
+            |start: u32, size: u32, full| start.checked_add(size).is_none_or(|end| end > full);
+        assert!(
+            !reaches(window.x, window.width, resolution[0])
+                && !reaches(window.y, window.height, resolution[1]),
+            "the window {window:?} reaches beyond the image of {resolution:?} pixels"
+        );
+        let starts = |size: u32| (0..size).step_by(TILE_SIZE as usize);
+        let tiles = starts(window.height)
+            .flat_map(|y| starts(window.width).map(move |x| (x, y)))
+            .map(|(x, y)| Window {
+                x: window.x + x,
+                y: window.y + y,
+                width: TILE_SIZE.min(window.width - x),
+                height: TILE_SIZE.min(window.height - y),
+            })
+            .map(|tile| FilmTile::new(tile, aovs))
+            .collect();
+        Self {
+            resolution,
+            window,
+            aovs,
+            tiles,
+        }
+    }
+
+    /// Width and height of the full image in pixels.
+    pub fn resolution(&self) -> [u32; 2] {
+        self.resolution
+    }
+
+    /// The part of the image that is rendered.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    /// The AOVs that are kept.
+    pub fn aovs(&self) -> AovSet {
+        self.aovs
+    }
+
+    /// The tiles, to be filled in any order, each by one thread at a time.
+    pub fn tiles_mut(&mut self) -> &mut [FilmTile] {
+        &mut self.tiles
+    }
+
+    /// The number of samples that every pixel has had at least: the index of
+    /// the next sample when all have had equally many.
+    pub fn samples_per_pixel(&self) -> u32 {
+        let least = |tile: &FilmTile| tile.samples_per_pixel();
+        self.tiles.iter().map(least).min().unwrap_or(0)
+    }
+
+    /// Samples that were left out of the image because their values were
+    /// impossible, by cause; empty when all is well.
+    pub fn faults(&self) -> Vec<FaultCount> {
+        let per_tile = |fault| {
+            let of_tiles = self.tiles.iter().map(move |tile| tile.fault(fault));
+            of_tiles.fold(FaultCount::new(fault), FaultCount::merge)
+        };
+        let counts = Fault::ALL.into_iter().map(per_tile);
+        counts.filter(|count| count.samples > 0).collect()
+    }
+
+    /// Bytes that the accumulators take.
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(FilmTile::bytes).sum()
+    }
+
+    /// The image so far: sums divided by counts. Pixels without a sample are
+    /// black.
+    pub fn develop(&self) -> Image {
+        let mut image = Image::black(self.resolution, self.window);
+        image.layers = self
+            .aovs
+            .iter()
+            .map(|aov| Layer::black(aov.name(), aov.channels(), self.window.area()))
+            .collect();
+        for tile in &self.tiles {
+            for pixel in tile.window().pixels() {
+                let index = self.window.index(pixel);
+                image.color[index] = tile.color(pixel).map(|c| c as f32);
+                for (layer, aov) in image.layers.iter_mut().zip(self.aovs.iter()) {
+                    let value = tile.aov(pixel, aov);
+                    for (plane, value) in layer.planes.iter_mut().zip(value) {
+                        plane[index] = value as f32;
+                    }
+                }
+            }
+        }
+        image
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(color: [f32; 3]) -> Sample {
+        Sample {
+            color,
+            ..Sample::default()
+        }
+    }
+
+    #[test]
+    fn tiles_cover_the_window_once() {
+        let window = Window {
+            x: 5,
+            y: 3,
+            width: 37,
+            height: 20,
+        };
+        let mut film = Film::new([64, 64], window, AovSet::NONE);
+        let mut hits = vec![0; window.area()];
+        for tile in film.tiles_mut() {
+            for pixel in tile.window().pixels() {
+                hits[window.index(pixel)] += 1;
+            }
+        }
+        assert!(hits.iter().all(|&count| count == 1));
+    }
+
+    #[test]
+    #[should_panic(expected = "beyond the image")]
+    fn a_window_outside_the_image_is_refused() {
+        let window = Window {
+            x: u32::MAX,
+            y: 0,
+            width: 2,
+            height: 1,
+        };
+        Film::new([8, 8], window, AovSet::NONE);
+    }
+
+    /// Samples 1 and 3: mean 2, variance of one sample 2, of the mean 1.
+    #[test]
+    fn mean_and_variance_of_two_samples() {
+        let aovs = AovSet::from_iter([Aov::Variance, Aov::Depth]);
+        let mut film = Film::new([1, 1], Window::full([1, 1]), aovs);
+        let tile = &mut film.tiles_mut()[0];
+        tile.add([0, 0], &sample([1.0, 0.0, 5.0]));
+        tile.add([0, 0], &sample([3.0, 0.0, 5.0]));
+        let image = film.develop();
+        assert_eq!(image.color, [[2.0, 0.0, 5.0]]);
+        let variance = image.layer("variance").unwrap();
+        assert_eq!(variance.planes, [[1.0], [0.0], [0.0]]);
+        let depth = image.layer("depth").unwrap();
+        assert_eq!(depth.planes, [[1e10]], "nothing was hit");
+    }
+
+    #[test]
+    fn aovs_are_averaged_and_depth_over_hits() {
+        let aovs = Aov::ALL.into_iter().collect();
+        let mut film = Film::new([1, 1], Window::full([1, 1]), aovs);
+        let hit = Sample {
+            color: [1.0; 3],
+            albedo: [0.5, 0.25, 1.0],
+            normal: [0.0, -1.0, 0.0],
+            depth: Some(3.0),
+            single: [0.75; 3],
+            multiple: [0.25; 3],
+        };
+        film.tiles_mut()[0].add([0, 0], &hit);
+        film.tiles_mut()[0].add([0, 0], &Sample::default());
+        let image = film.develop();
+        let layer = |name| image.layer(name).unwrap().planes.concat();
+        assert_eq!(layer("albedo"), [0.25, 0.125, 0.5]);
+        assert_eq!(layer("normal"), [0.0, -0.5, 0.0]);
+        assert_eq!(layer("depth"), [3.0]);
+        assert_eq!(layer("single"), [0.375; 3]);
+        assert_eq!(layer("multiple"), [0.125; 3]);
+    }
+
+    #[test]
+    fn impossible_samples_are_counted_by_cause_and_left_out() {
+        let mut film = Film::new([40, 40], Window::full([40, 40]), AovSet::NONE);
+        for tile in film.tiles_mut() {
+            for pixel in tile.window().pixels() {
+                tile.add(pixel, &sample([2.0; 3]));
+                if pixel[0] == pixel[1] {
+                    tile.add(pixel, &sample([1.0, f32::NAN, -1.0]));
+                    tile.add(pixel, &sample([f32::INFINITY, 1.0, 1.0]));
+                    tile.add(pixel, &sample([0.0, -1e-9, 1.0]));
+                    tile.add(pixel, &sample([-0.0, 4.0, 4.0]));
+                }
+            }
+        }
+        let image = film.develop();
+        assert_eq!(image.color[41], [1.0, 3.0, 3.0]);
+        assert_eq!(image.color[1], [2.0; 3]);
+        assert_eq!(film.samples_per_pixel(), 1);
+        let faults = film.faults();
+        let causes: Vec<_> = faults.iter().map(|f| (f.fault, f.samples)).collect();
+        let expected = Fault::ALL.into_iter().take(3).map(|fault| (fault, 40));
+        assert_eq!(causes, expected.collect::<Vec<_>>());
+        assert_eq!(faults[0].pixels[..2], [[0, 0], [1, 1]]);
+    }
+
+    /// Same bits from one thread and from many, whichever tile comes first.
+    #[test]
+    fn sums_do_not_depend_on_the_order_of_tiles() {
+        use rayon::prelude::*;
+        let fill = |tile: &mut FilmTile| {
+            for pixel in tile.window().pixels() {
+                for index in 0..8 {
+                    let mut sampler = crate::sampler::Sampler::new(0, pixel, index);
+                    let u = sampler.get_4d(crate::sampler::Dimension::bsdf(0));
+                    tile.add(pixel, &sample([u[0], u[1] * 1e6, u[2] * 1e-6]));
+                }
+            }
+        };
+        let new = || Film::new([70, 50], Window::full([70, 50]), AovSet::NONE);
+        let (mut serial, mut parallel) = (new(), new());
+        serial.tiles_mut().iter_mut().rev().for_each(fill);
+        parallel.tiles_mut().par_iter_mut().for_each(fill);
+        assert!(serial == parallel);
+    }
+
+    #[test]
+    fn only_requested_aovs_take_memory() {
+        let bytes = |aovs| Film::new([64, 64], Window::full([64, 64]), aovs).bytes();
+        let none = bytes(AovSet::NONE);
+        assert_eq!(bytes(AovSet::from_iter([Aov::Variance])), none);
+        let depth = bytes(AovSet::from_iter([Aov::Depth]));
+        assert_eq!(depth - none, 64 * 64 * 16);
+    }
+}

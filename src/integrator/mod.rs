@@ -1,1 +1,9 @@
-//! (see the crate's front page)
+//! From a scene to a film: which paths are traced, by which kernel, until when.
+
+mod kernel;
+mod path;
+mod render;
+
+pub use kernel::{KERNELS, kernel_for};
+pub use path::{FirstHit, PathResult, PathTracer};
+pub use render::{Limits, Progress, RenderReport, RenderRequest, Stop, render};

@@ -1,1 +1,166 @@
-//! (see the crate's front page)
+//! Triangle meshes from Wavefront OBJ files.
+//!
+//! `tobj` reads them. What it is fed goes through `lines`, which knows the
+//! line of every mistake and leaves out what the scene has no use for.
+
+mod assemble;
+mod lines;
+
+use std::fmt;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Triangles with one index per corner for all that a vertex has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// In metres, in the space of the object. There is capacity for one more,
+    /// since Embree reads 16 bytes from the last one.
+    pub positions: Vec<[f32; 3]>,
+    /// Indices of vertices, counter-clockwise as seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit vectors; absent for flat shading.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// Texture coordinates, v upwards.
+    pub uvs: Option<Vec<[f32; 2]>>,
+    /// For each triangle an index into `material_names`; absent when all have
+    /// the first name, or there is none.
+    pub material_of_triangle: Option<Vec<u16>>,
+    /// The `usemtl` names in the order of their first use; `""` stands for
+    /// faces before the first of them.
+    pub material_names: Vec<String>,
+}
+
+/// What is to be read beside positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// Texture coordinates.
+    pub uvs: bool,
+    /// Normals; without them shading is flat.
+    pub normals: bool,
+}
+
+impl Wanted {
+    /// All that the file has.
+    pub const ALL: Self = Self {
+        uvs: true,
+        normals: true,
+    };
+}
+
+/// What was amiss with a mesh and how it was made good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Repair {
+    /// So many faces of more than four corners were cut into fans.
+    PolygonsTriangulated(usize),
+    /// So many points and lines were left out.
+    PointsAndLinesIgnored(usize),
+    /// So many triangles without an area were left out.
+    DegenerateTrianglesDropped(usize),
+    /// So many corners had a normal of length zero or NaN, and got the one of
+    /// their triangle.
+    NormalsReplaced(usize),
+    /// So many triangles are in groups where only some corners have a normal,
+    /// and are shaded flat.
+    NormalsIncomplete(usize),
+    /// So many vertices had no texture coordinates, or infinite ones or NaN,
+    /// and got (0, 0).
+    UvsReplaced(usize),
+}
+
+impl fmt::Display for Repair {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::PolygonsTriangulated(n) => {
+                write!(f, "{n} faces of more than four corners cut into fans")
+            }
+            Self::PointsAndLinesIgnored(n) => write!(f, "{n} points and lines left out"),
+            Self::DegenerateTrianglesDropped(n) => write!(f, "{n} triangles without area left out"),
+            Self::NormalsReplaced(n) => write!(
+                f,
+                "{n} corners without a usable normal given their triangle's"
+            ),
+            Self::NormalsIncomplete(n) => {
+                write!(f, "{n} triangles shaded flat, since corners lack normals")
+            }
+            Self::UvsReplaced(n) => write!(
+                f,
+                "{n} vertices without usable texture coordinates given (0, 0)"
+            ),
+        }
+    }
+}
+
+/// Why a mesh can't be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .problems.iter().map(|problem| format!("{source_name}{problem}")).collect::<Vec<_>>().join("\n"))]
+pub struct MeshError {
+    /// The file.
+    pub source_name: String,
+    /// What is wrong with it; never empty.
+    pub problems: Vec<LineProblem>,
+}
+
+/// What is wrong with a line, or with a whole file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LineProblem {
+    /// Counted from 1; absent when the file as a whole is meant.
+    pub line: Option<usize>,
+    /// What was expected and what was found.
+    pub message: String,
+}
+
+impl fmt::Display for LineProblem {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, ":{line}: {}", self.message),
+            None => write!(f, ": {}", self.message),
+        }
+    }
+}
+
+impl Mesh {
+    /// Reads an OBJ file, all groups into one mesh. Material libraries are not
+    /// opened: `usemtl` names are all that counts.
+    ///
+    /// # Errors
+    /// When the file can't be read, has no triangles, or has lines that make
+    /// no sense.
+    pub fn load(path: &Path, wanted: Wanted) -> Result<(Self, Vec<Repair>), MeshError> {
+        let name = path.display().to_string();
+        let file = File::open(path).map_err(|error| MeshError {
+            source_name: name.clone(),
+            problems: vec![LineProblem {
+                line: None,
+                message: format!("the mesh can't be opened: {error}"),
+            }],
+        })?;
+        Self::read(BufReader::with_capacity(1 << 16, file), &name, wanted)
+    }
+
+    /// As [`Mesh::load`], from anything that gives bytes.
+    ///
+    /// # Errors
+    /// As [`Mesh::load`]; `source_name` stands for the file's name.
+    pub fn read(
+        reader: impl BufRead,
+        source_name: &str,
+        wanted: Wanted,
+    ) -> Result<(Self, Vec<Repair>), MeshError> {
+        let mut lines = lines::Lines::new(reader, wanted);
+        let options = tobj::LoadOptions {
+            triangulate: true,
+            single_index: true,
+            ..Default::default()
+        };
+        let loaded = tobj::load_obj_buf(&mut lines, &options, lines::material_of_its_own);
+        let result = match lines.finish(loaded) {
+            Ok((models, names, repairs)) => assemble::assemble(models, names, repairs, wanted),
+            Err(problems) => Err(problems),
+        };
+        result.map_err(|problems| MeshError {
+            source_name: source_name.to_owned(),
+            problems,
+        })
+    }
+}

@@ -1,1 +1,284 @@
-//! (see the crate's front page)
+//! The scene as it is rendered: immutable, indices for names, radiometric
+//! quantities for the file's units, nothing that no ray asks for.
+
+mod features;
+mod load;
+mod material;
+mod materials;
+mod resolve;
+mod surface;
+mod transform;
+
+pub use features::{Features, has};
+pub use load::Assets;
+pub use material::{
+    Distribution, Facet, Leaf, Material, Number, RoughMaterial, Roughness, Tangent, Tint,
+    WeightedLeaf, blender_alphas,
+};
+pub use materials::{MaterialError, Names, compile_material};
+pub use resolve::{ResolveError, Resolved, assemble, resolve};
+pub use surface::Surface;
+pub use transform::{euler, to_affine};
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
+
+use crate::bsdf::Layers;
+use crate::camera::Camera;
+use crate::color::Rgb;
+use crate::embree::{Accelerator, Hit, Ray, Vertices};
+use crate::light::Lights;
+use crate::texture::Texture;
+
+/// A mesh and what the scene needs of it.
+#[derive(Debug)]
+pub struct SceneMesh {
+    /// Positions, metres: in world space if one object alone uses the mesh,
+    /// else in the objects' own.
+    pub vertices: Arc<Vertices>,
+    /// Three vertices for each triangle, counter-clockwise from outside.
+    pub triangles: Arc<Vec<[u32; 3]>>,
+    /// A normal for each vertex, in the space of the positions.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// Texture coordinates for each vertex.
+    pub uvs: Option<Vec<[f32; 2]>>,
+    /// For each triangle, which of the object's materials it has; all have the
+    /// first without it.
+    pub slots: Option<Vec<u16>>,
+}
+
+/// Something to be seen.
+#[derive(Debug)]
+pub struct Object {
+    /// For messages.
+    pub name: String,
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Where an instance stands; absent when the mesh is in world space.
+    pub to_world: Option<Affine3A>,
+    /// Takes normals from object space to world space; not normalised.
+    pub normal_to_world: Mat3A,
+    /// World space to the box round the mesh, each side from −½ to ½; there
+    /// only when a material has a radial tangent.
+    pub world_to_box: Option<Affine3A>,
+    /// Whether the transform is a reflection, which turns triangles inside out.
+    pub mirrored: bool,
+    /// Material indices by slot.
+    pub materials: Vec<usize>,
+    /// Whether camera rays see it.
+    pub visible_to_camera: bool,
+    /// For an emissive object, the number of its first triangle among the
+    /// emissive triangles of all objects.
+    pub first_emitter: Option<u32>,
+}
+
+/// All there is to render.
+#[derive(Debug)]
+pub struct Scene {
+    /// The geometry; geometry `i` is object `i`.
+    pub accelerator: Accelerator,
+    /// Meshes.
+    pub meshes: Vec<SceneMesh>,
+    /// Objects.
+    pub objects: Vec<Object>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Textures.
+    pub textures: Vec<Texture>,
+    /// All lights, the world among them.
+    pub lights: Lights,
+    /// The camera; measurements need none.
+    pub camera: Option<Camera>,
+    /// What the scene uses.
+    pub features: Features,
+    /// Surface interactions after the first.
+    pub max_bounces: u32,
+    /// Russian roulette starts at this bounce.
+    pub roulette_start: u32,
+}
+
+impl Scene {
+    /// The surface that `hit` on `ray` is on.
+    #[must_use]
+    #[inline]
+    pub fn surface<const F: u32>(&self, ray: &Ray, hit: &Hit) -> Surface {
+        let object_index = hit.geometry as usize;
+        let object = &self.objects[object_index];
+        let mesh = &self.meshes[object.mesh];
+        let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let (w, u, v) = (1.0 - hit.u - hit.v, hit.u, hit.v);
+
+        let place = |i: usize| {
+            let p = Vec3A::from(mesh.vertices[i]);
+            match &object.to_world {
+                Some(to_world) if has::<F>(Features::INSTANCES) => to_world.transform_point3a(p),
+                _ => p,
+            }
+        };
+        let [a, b, c] = corners.map(place);
+        let position = a * w + b * u + c * v;
+        // An instance's vertices carry the rounding of their transform as well.
+        let origin = match &object.to_world {
+            Some(to_world) if has::<F>(Features::INSTANCES) => to_world.translation.abs(),
+            _ => Vec3A::ZERO,
+        };
+        let error = Surface::position_error(Vec3::from(
+            (a * w).abs() + (b * u).abs() + (c * v).abs() + origin,
+        ));
+
+        let cross = Vec3::from((b - a).cross(c - a));
+        let outward = if object.mirrored { -cross } else { cross };
+        // A triangle that rounds to no area has no side: face the viewer.
+        let geometric = outward.try_normalize().unwrap_or(-ray.direction);
+        let front = geometric.dot(ray.direction) <= 0.0;
+        let geometric_normal = if front { geometric } else { -geometric };
+
+        let normal = match &mesh.normals {
+            Some(normals) if has::<F>(Features::SMOOTH_NORMALS) => {
+                let [a, b, c] = corners.map(|i| Vec3A::from(normals[i]));
+                let local = a * w + b * u + c * v;
+                let world = match object.to_world {
+                    Some(_) if has::<F>(Features::INSTANCES) => object.normal_to_world * local,
+                    _ => local,
+                };
+                let world = Vec3::from(world).try_normalize().unwrap_or(geometric);
+                let facing = if front { world } else { -world };
+                towards_viewer(facing, geometric_normal, -ray.direction)
+            }
+            _ => geometric_normal,
+        };
+
+        let mut uv = Vec2::ZERO;
+        let mut along_u = Vec3::ZERO;
+        if has::<F>(Features::TEXTURES) || has::<F>(Features::ANISOTROPY) {
+            if let Some(uvs) = &mesh.uvs {
+                let [ta, tb, tc] = corners.map(|i| Vec2::from(uvs[i]));
+                uv = ta * w + tb * u + tc * v;
+                if has::<F>(Features::ANISOTROPY) {
+                    let (du, dv) = (tb - ta, tc - ta);
+                    let area = du.perp_dot(dv);
+                    along_u = Vec3::from(((b - a) * dv.y - (c - a) * du.y) * area.signum());
+                }
+            }
+        }
+        let mut in_box = Vec3::ZERO;
+        if has::<F>(Features::ANISOTROPY) {
+            if let Some(to_box) = &object.world_to_box {
+                in_box = Vec3::from(to_box.transform_point3a(position));
+            }
+        }
+
+        let slot = mesh
+            .slots
+            .as_ref()
+            .map_or(0, |slots| slots[hit.triangle as usize] as usize);
+        Surface {
+            position: Vec3::from(position),
+            error,
+            geometric_normal,
+            normal,
+            front,
+            uv,
+            material: object.materials[slot],
+            object: object_index,
+            triangle: hit.triangle,
+            along_u,
+            in_box,
+            normal_to_world: object.normal_to_world,
+        }
+    }
+
+    /// How many triangles rays can meet, each instance counted.
+    #[must_use]
+    pub fn triangles(&self) -> usize {
+        self.objects
+            .iter()
+            .map(|o| self.meshes[o.mesh].triangles.len())
+            .sum()
+    }
+
+    /// The closures at a surface point.
+    #[must_use]
+    #[inline]
+    pub fn layers(&self, surface: &Surface) -> Layers {
+        self.materials[surface.material].layers(&self.textures, surface)
+    }
+
+    /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle, given the
+    /// triangle's number among those of all objects and barycentric weights of
+    /// its second and third corner.
+    #[must_use]
+    pub fn emission_at(&self, emitter: u32, [u, v]: [f32; 2]) -> Rgb {
+        let begins = |object: &Object| object.first_emitter.filter(|&first| first <= emitter);
+        let owner = self
+            .objects
+            .iter()
+            .filter_map(|o| Some((begins(o)?, o)))
+            .max_by_key(|p| p.0);
+        let Some((first, object)) = owner else {
+            return Rgb::ZERO;
+        };
+        let triangle = (emitter - first) as usize;
+        let mesh = &self.meshes[object.mesh];
+        let slot = mesh
+            .slots
+            .as_ref()
+            .map_or(0, |slots| slots[triangle] as usize);
+        let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
+            let [a, b, c] = mesh.triangles[triangle].map(|i| Vec2::from(uvs[i as usize]));
+            a * (1.0 - u - v) + b * u + c * v
+        });
+        self.materials[object.materials[slot]].emission(&self.textures, uv)
+    }
+
+    /// The radiance that a surface point sends towards the viewer by itself,
+    /// W·m⁻²·sr⁻¹.
+    #[must_use]
+    pub fn emission(&self, surface: &Surface) -> Rgb {
+        self.materials[surface.material].emission(&self.textures, surface.uv)
+    }
+}
+
+/// An interpolated normal may face away from the viewer near silhouettes, where
+/// a closure would have nothing to say. Tilts it towards the geometric normal
+/// just far enough that the viewer is above its horizon.
+fn towards_viewer(normal: Vec3, geometric: Vec3, viewer: Vec3) -> Vec3 {
+    /// Cosine that is left between normal and viewer after the tilt.
+    const GRAZING: f32 = 1e-3;
+    let cos = normal.dot(viewer);
+    if cos >= GRAZING {
+        return normal;
+    }
+    let cos_geometric = geometric.dot(viewer);
+    // Solve (normal + k · geometric) · viewer = GRAZING · cos_geometric; the
+    // target shrinks with the geometric cosine so that there is a solution.
+    let target = GRAZING * cos_geometric;
+    let k = (target - cos) / cos_geometric.max(1e-6);
+    (normal + geometric * k.max(0.0))
+        .try_normalize()
+        .unwrap_or(geometric)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_normal_that_faces_away_is_tilted_just_above_the_horizon() {
+        let geometric = Vec3::Z;
+        let viewer = Vec3::new(1.0, 0.0, 0.1).normalize();
+        let away = Vec3::new(-0.6, 0.0, 0.8);
+        assert!(away.dot(viewer) < 0.0);
+        let tilted = towards_viewer(away, geometric, viewer);
+        assert!(
+            tilted.dot(viewer) > 0.0 && tilted.dot(viewer) < 1e-3,
+            "{tilted}"
+        );
+        assert_eq!(
+            towards_viewer(geometric, geometric, viewer),
+            geometric,
+            "left alone"
+        );
+    }
+}

@@ -1,0 +1,56 @@
+#!/bin/sh
+# Rebuild scenes/: .blend by script (Blender 3.4), export, Cycles references.
+#
+#   blender/make_scenes.sh [gold_sphere|suzanne|sphere_rows|furnace]...
+#
+# Needs `blender` 3.4 on PATH, and for the references of 4.5 BPY45, a folder
+# with the bpy 4.5 module (pip install --no-deps --target DIR bpy==4.5.15, and
+# numpy < 2 beside it); without BPY45 those are left as they are.
+# The .blend files go to out/blend and are not committed.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(dirname "$here")
+blends=$root/out/blend
+mkdir -p "$blends"
+
+build() { # scene
+    nice blender -b --factory-startup --python "$here/scenes/$1.py" -- "$blends/$1.blend"
+    mkdir -p "$root/scenes/$1"
+    nice blender -b "$blends/$1.blend" --python "$here/export.py" -- "$root/scenes/$1"
+}
+
+cycles34() { # scene name options...: scenes/SCENE/cycles_3.4_NAME.{exr,json}
+    out=$root/scenes/$1/cycles_3.4_$2 blend=$blends/$1.blend
+    shift 2
+    nice blender -b "$blend" --python "$here/render_cycles.py" -- \
+        "$out.exr" --json "$out.json" --half "$@"
+}
+
+cycles45() { # as above
+    [ -n "${BPY45:-}" ] || { echo "BPY45 is not set: $1 $2 of 4.5 left as it is" >&2; return 0; }
+    out=$root/scenes/$1/cycles_4.5_$2 blend=$blends/$1.blend
+    shift 2
+    PYTHONPATH=$BPY45 nice python3 "$here/render_cycles.py" \
+        "$blend" "$out.exr" --json "$out.json" --half "$@"
+}
+
+gold_sphere() {
+    build gold_sphere
+    for r in 0.5 0.8; do
+        cycles34 gold_sphere "multi_ggx_r$r" --distribution MULTI_GGX --roughness $r --spp 512 --seeds 5 --seed 1
+        cycles45 gold_sphere "ggx_r$r" --distribution GGX --roughness $r --spp 512 --seeds 3 --seed 1
+    done
+}
+
+suzanne() {
+    build suzanne
+    cycles34 suzanne multi_ggx --percent 50 --spp 256 --seeds 3 --seed 1
+    cycles45 suzanne ggx --percent 50 --distribution GGX --spp 256 --seeds 2 --seed 1
+}
+
+if [ $# -eq 0 ]; then
+    set -- gold_sphere suzanne
+fi
+for scene; do
+    "$scene"
+done

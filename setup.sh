@@ -1,0 +1,200 @@
+#!/usr/bin/env bash
+# Installs what the build needs, and nothing that is there already.
+# For Debian 12, Debian 13 and Ubuntu 24.04, as root or with sudo; with neither
+# it says what to install and fails. A second call changes nothing.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+usage() {
+    cat <<'END'
+usage: ./setup.sh [--with-lints] [--with-blender]
+
+  --with-lints     also cargo fmt and cargo clippy
+  --with-blender   also the distribution's Blender, for reference renders and
+                   the tests of the exporter
+
+EMBREE_DIR names an Embree 4.3 or newer to use instead of the distribution's.
+END
+}
+
+RUST=1.85
+EMBREE=4.3
+# Debian 12 packages only Embree 3. There the library comes out of this wheel.
+WHEEL=embreex==4.4.0.post1
+WHEEL_SHA256=2cd0f7d5c6342e6247e31f700761689cae7829454d8c6de0c41e62124a023e1f
+PRIVATE=.deps/embree
+
+lints=false blender=false
+for option in "$@"; do
+    case $option in
+        --with-lints) lints=true ;;
+        --with-blender) blender=true ;;
+        -h | --help) usage && exit 0 ;;
+        *) usage >&2 && exit 2 ;;
+    esac
+done
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+die() { say "$@" && exit 1; }
+has() { command -v "$1" >/dev/null 2>&1; }
+at_least() { [[ $(printf '%s\n' "$2" "$1" | sort -V | head -n 1) == "$2" ]]; }
+exists() { compgen -G "$1" >/dev/null; }
+
+# What is there?
+
+libclang_is_here() {
+    [[ -n ${LIBCLANG_PATH:-} ]] && return
+    # The library, and the compiler's own headers, which bindgen reads too.
+    { exists '/usr/lib/llvm-*/lib/libclang[.-][s0-9]*' || exists '/usr/lib*/libclang.so*'; } &&
+        { exists '/usr/lib/llvm-*/lib/clang/*/include/stddef.h' || exists '/usr/lib*/clang/*/include/stddef.h'; }
+}
+
+# The same places, in the same order, as build.rs.
+embree_is_here() {
+    local multiarch dir version
+    multiarch=lib/$(uname -m)-linux-gnu
+    if [[ -n ${EMBREE_DIR:-} ]]; then
+        for dir in "$EMBREE_DIR"/{lib,lib64,"$multiarch",.}; do
+            [[ -e $dir/libembree4.so ]] && return
+        done
+        die "EMBREE_DIR is '$EMBREE_DIR', but libembree4.so is neither there nor in its lib, lib64 or $multiarch"
+    fi
+    [[ -e $PRIVATE/lib/libembree4.so ]] && return
+    for dir in "/usr/$multiarch" /usr/lib64 /usr/lib /usr/local/lib; do
+        if [[ -e $dir/libembree4.so ]]; then
+            version=$(dpkg-query -W -f '${Version}' libembree-dev 2>/dev/null) || return 0
+            at_least "$version" $EMBREE && return
+        fi
+    done
+    return 1
+}
+
+cargo_is_here() {
+    local version
+    version=$(cargo --version 2>/dev/null | cut -d ' ' -f 2) && at_least "$version" $RUST
+}
+
+PATH=$PATH:${HOME:-/root}/.cargo/bin
+packages=() need_cargo=false need_embree=false
+{ has cc && has c++; } || packages+=(g++)
+libclang_is_here || packages+=(libclang-dev)
+embree_is_here || need_embree=true
+cargo_is_here || need_cargo=true
+if $blender; then
+    has blender || packages+=(blender)
+    # For the distribution's Blender, which runs the distribution's Python.
+    /usr/bin/python3 -c 'import numpy' 2>/dev/null || packages+=(python3-numpy)
+fi
+if $lints && ! $need_cargo && ! { cargo fmt --version && cargo clippy --version; } >/dev/null 2>&1; then
+    has rustup && die "cargo fmt or cargo clippy is missing: rustup component add rustfmt clippy"
+    packages+=(rustfmt rust-clippy)
+fi
+if [[ ${#packages[@]} -eq 0 ]] && ! $need_cargo && ! $need_embree; then
+    exit 0
+fi
+
+# What can be had?
+
+as_root=() may_install=true
+if ! has apt-get; then
+    may_install=false
+elif [[ $EUID -ne 0 ]]; then
+    as_root=(sudo)
+    # Ask for a password only where somebody can type it.
+    sudo -n true 2>/dev/null || { [[ -t 0 ]] && has sudo && sudo -v; } || may_install=false
+fi
+
+log=$(mktemp)
+trap 'rm -rf "$log" .deps/new' EXIT
+apt_get() {
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get -y -q -o DPkg::Lock::Timeout=300 "$@" </dev/null >"$log" 2>&1
+}
+apt_offers() {
+    local candidate
+    candidate=$(LC_ALL=C apt-cache policy "$1" 2>/dev/null | sed -n 's/^  Candidate: //p')
+    [[ $candidate =~ ^[0-9] ]] && at_least "$candidate" "$2"
+}
+can_unpack_wheel() { [[ $(uname -m) == x86_64 ]]; }
+has_pip() { python3 -m pip --version >/dev/null 2>&1; }
+
+if $may_install; then
+    say "reading the package lists"
+    apt_get update || say "warning: apt-get update failed: $(tail -n 1 "$log")"
+fi
+
+if $need_cargo && ! has rustup && apt_offers cargo $RUST; then
+    packages+=(cargo ca-certificates)
+    ! $lints || packages+=(rustfmt rust-clippy)
+    need_cargo=false
+fi
+
+need_wheel=false
+if $need_embree; then
+    # Without the right to install, a wheel in this folder does as well.
+    if apt_offers libembree-dev $EMBREE && { $may_install || ! has_pip || ! can_unpack_wheel; }; then
+        packages+=(libembree-dev)
+    elif can_unpack_wheel; then
+        need_wheel=true
+        has_pip || packages+=(python3-pip)
+    else
+        die "no Embree $EMBREE or newer is packaged for $(uname -m) here: build it and set EMBREE_DIR to its folder"
+    fi
+fi
+
+# Get it.
+
+if [[ ${#packages[@]} -gt 0 ]]; then
+    if ! $may_install; then
+        say "these are missing and need root or sudo to install:"
+        say "    apt-get update && apt-get install ${packages[*]}"
+        ! $need_cargo || say "and Rust $RUST or newer, which needs neither: https://rustup.rs"
+        exit 1
+    fi
+    say "installing ${packages[*]}"
+    apt_get install --no-install-recommends "${packages[@]}" || {
+        cat "$log" >&2
+        die "apt-get install ${packages[*]} failed, see above"
+    }
+fi
+
+if $need_wheel; then
+    say "fetching Embree from the wheel $WHEEL"
+    rm -rf .deps/new
+    mkdir -p .deps/new
+    printf '%s --hash=sha256:%s\n' "$WHEEL" "$WHEEL_SHA256" >.deps/new/requirements.txt
+    # The Python named here only picks the wheel; nothing of it is run.
+    python3 -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: \
+        --implementation cp --python-version 3.11 --platform manylinux_2_28_x86_64 \
+        --require-hashes --requirement .deps/new/requirements.txt --dest .deps/new >"$log" 2>&1 || {
+        cat "$log" >&2
+        die "pip could not download $WHEEL, see above"
+    }
+    python3 - <<'END'
+import ctypes, pathlib, zipfile
+
+new = pathlib.Path(".deps/new")
+(wheel,) = new.glob("*.whl")
+(new / "lib").mkdir()
+with zipfile.ZipFile(wheel) as archive:
+    for name in archive.namelist():
+        if name.startswith("embreex.libs/lib"):
+            (new / "lib" / pathlib.Path(name).name).write_bytes(archive.read(name))
+wheel.unlink()
+(library,) = (new / "lib").glob("libembree4-*.so.4")
+(new / "lib" / "libembree4.so").symlink_to(library.name)
+ctypes.CDLL(str(library.resolve()))  # raises where a library that it needs is missing
+END
+    rm -rf $PRIVATE
+    mkdir -p $PRIVATE
+    mv .deps/new/lib $PRIVATE/lib
+fi
+
+if $need_cargo; then
+    if has rustup; then
+        die "cargo is older than $RUST or has no toolchain: rustup update stable && rustup default stable"
+    fi
+    apt_offers rustup 0 && how="apt-get install rustup && rustup default stable" || how="https://rustup.rs"
+    die "Rust $RUST or newer is missing and not packaged here; get it with: $how"
+fi
+say "done"

@@ -1,0 +1,113 @@
+//! The closed set of closures, matched once per hit.
+
+use glam::Vec3;
+
+use super::{BsdfSample, Interface, Lambert, Mirror, Rough};
+use crate::color::Rgb;
+use crate::microsurface::{
+    self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally,
+};
+
+/// Everything that a surface can scatter with.
+#[derive(Clone, Copy, Debug)]
+pub enum Closure {
+    /// Perfectly diffuse.
+    Lambert(Lambert),
+    /// An exact mirror.
+    Mirror(Mirror),
+    /// An exact smooth interface.
+    Interface(Interface),
+    /// Lets this share of the light straight through.
+    Transparent(Rgb),
+    /// Rough metal, GGX.
+    GgxConductor(Rough<Ggx<f32>, Conductor<f32>>),
+    /// Rough metal, Beckmann.
+    BeckmannConductor(Rough<Beckmann<f32>, Conductor<f32>>),
+    /// Rough glass, GGX.
+    GgxDielectric(Rough<Ggx<f32>, Dielectric<f32>>),
+    /// Rough glass, Beckmann.
+    BeckmannDielectric(Rough<Beckmann<f32>, Dielectric<f32>>),
+    /// Diffuse facets, GGX.
+    GgxDiffuse(Rough<Ggx<f32>, Diffuse<f32>>),
+    /// Diffuse facets, Beckmann.
+    BeckmannDiffuse(Rough<Beckmann<f32>, Diffuse<f32>>),
+}
+
+/// Runs `$body` for whichever rough closure it is, and `$other` for the rest.
+macro_rules! each_rough {
+    ($closure:expr, $rough:ident => $body:expr, $($other:tt)*) => {
+        match $closure {
+            Closure::GgxConductor($rough) => $body,
+            Closure::BeckmannConductor($rough) => $body,
+            Closure::GgxDielectric($rough) => $body,
+            Closure::BeckmannDielectric($rough) => $body,
+            Closure::GgxDiffuse($rough) => $body,
+            Closure::BeckmannDiffuse($rough) => $body,
+            $($other)*
+        }
+    };
+}
+
+/// Below this cosine a direction counts as inside the surface: nothing is
+/// scattered from there, and 1/cosθ would overflow.
+const MIN_COS: f32 = 1e-7;
+
+impl Closure {
+    /// Whether all of its light goes into single directions, so that `eval`
+    /// and `pdf` have nothing to say.
+    #[must_use]
+    pub fn is_delta(&self) -> bool {
+        matches!(
+            self,
+            Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_)
+        )
+    }
+
+    /// Draws a direction; see the contract of [`crate::bsdf`]. The one place
+    /// that refuses degenerate samples: what comes back is a finite unit
+    /// direction with a finite, non-negative, non-zero weight.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
+        // Written so that NaN is refused too.
+        if !(wo.z > MIN_COS) {
+            return None;
+        }
+        let sample = each_rough!(self, rough => rough.sample(wo, rng)?,
+            Self::Lambert(lambert) => lambert.sample(rng),
+            Self::Mirror(mirror) => mirror.sample(wo),
+            Self::Interface(interface) => interface.sample(wo, rng),
+            Self::Transparent(color) => BsdfSample { wi: -wo, weight: *color, order: 1 },
+        );
+        let usable = sample.wi.is_finite()
+            && sample.weight.is_finite()
+            && sample.weight.min_element() >= 0.0
+            && sample.weight.max_element() > 0.0;
+        usable.then_some(sample)
+    }
+
+    /// Adds f·|cosθ_i| or an estimate of it, sr⁻¹, to `tally`, order by order;
+    /// nothing for delta closures.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, rng: &mut impl Draw<f32>, tally: &mut impl Tally<f32>) {
+        if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
+            return;
+        }
+        each_rough!(self, rough => rough.eval(wo, wi, rng, tally),
+            Self::Lambert(lambert) => tally.add(1, model::Rgb(lambert.eval(wi).to_array())),
+            Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => {}
+        );
+    }
+
+    /// The density that multiple importance sampling uses, sr⁻¹; zero for
+    /// delta closures.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
+            return 0.0;
+        }
+        each_rough!(self, rough => rough.pdf(wo, wi),
+            Self::Lambert(lambert) => lambert.pdf(wi),
+            Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => 0.0,
+        )
+    }
+}

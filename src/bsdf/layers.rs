@@ -1,0 +1,186 @@
+//! The closures of one shading point: a mix, laid flat.
+
+use arrayvec::ArrayVec;
+use glam::Vec3;
+
+use super::{ByOrder, Closure, Frame};
+use crate::color::Rgb;
+use crate::microsurface::{self as model, Draw, Tally};
+
+/// The most closures that a material may flatten to.
+pub const MAX_LAYERS: usize = 8;
+
+/// One closure of a mix.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer {
+    /// Its share of the mix; the shares of a material's closures, emission
+    /// among them, add up to one.
+    pub share: f32,
+    /// The frame it scatters in, z on the viewer's side.
+    pub frame: Frame,
+    /// What it scatters like.
+    pub closure: Closure,
+}
+
+/// A direction sampled from a mix, in world space.
+#[derive(Clone, Copy, Debug)]
+pub struct ScatterSample {
+    /// Unit length.
+    pub wi: Vec3,
+    /// f·|cosθ_i| over the density of `wi`.
+    pub weight: Rgb,
+    /// Facets met; 1 is single scattering.
+    pub order: u32,
+    /// Whether the closure scatters into single directions, which no light
+    /// sample can meet.
+    pub delta: bool,
+    /// Whether the direction is the straight continuation of the ray.
+    pub straight: bool,
+}
+
+/// All closures at a hit, with the geometric normal that tells reflection from
+/// transmission.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    layers: ArrayVec<Layer, MAX_LAYERS>,
+    /// Geometric normal on the viewer's side, world space.
+    normal: Vec3,
+    /// The sum of the shares.
+    total: f32,
+}
+
+impl Layers {
+    /// None yet, on a surface with this geometric normal (viewer's side).
+    #[must_use]
+    pub fn new(normal: Vec3) -> Self {
+        Self {
+            layers: ArrayVec::new(),
+            normal,
+            total: 0.0,
+        }
+    }
+
+    /// Adds a closure; those without a share are left out.
+    ///
+    /// # Panics
+    /// Past [`MAX_LAYERS`], which scenes are checked for when they are resolved.
+    pub fn push(&mut self, layer: Layer) {
+        if layer.share > 0.0 {
+            self.total += layer.share;
+            self.layers.push(layer);
+        }
+    }
+
+    /// Whether any closure can be met by light samples.
+    #[must_use]
+    pub fn has_smooth(&self) -> bool {
+        self.layers.iter().any(|layer| !layer.closure.is_delta())
+    }
+
+    /// The share of light that goes straight through, per channel.
+    #[must_use]
+    pub fn transparency(&self) -> Rgb {
+        let straight = |layer: &Layer| match layer.closure {
+            Closure::Transparent(color) => color * layer.share,
+            _ => Rgb::ZERO,
+        };
+        self.layers.iter().map(straight).sum()
+    }
+
+    /// Chooses a closure by its share with `choice` in [0, 1), and samples it.
+    pub fn sample(&self, wo: Vec3, choice: f32, rng: &mut impl Draw<f32>) -> Option<ScatterSample> {
+        let layer = self.choose(choice)?;
+        let sample = layer.closure.sample(layer.frame.to_local(wo), rng)?;
+        let wi = layer.frame.to_world(sample.wi);
+        if !self.same_side(wi, sample.wi.z) {
+            return None;
+        }
+        Some(ScatterSample {
+            wi,
+            // share / (share / total)
+            weight: sample.weight * self.total,
+            order: sample.order,
+            delta: layer.closure.is_delta(),
+            straight: matches!(layer.closure, Closure::Transparent(_)),
+        })
+    }
+
+    /// f·|cosθ_i| of the mix or an estimate of it, sr⁻¹.
+    #[must_use]
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, rng: &mut impl Draw<f32>) -> ByOrder {
+        let mut sum = ByOrder::ZERO;
+        self.eval_orders(wo, wi, rng, &mut sum);
+        sum
+    }
+
+    /// Adds f·|cosθ_i| or an estimate of it, sr⁻¹, to `tally`, order by order.
+    #[inline]
+    pub fn eval_orders(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        rng: &mut impl Draw<f32>,
+        tally: &mut impl Tally<f32>,
+    ) {
+        for layer in &self.layers {
+            let local = layer.frame.to_local(wi);
+            if self.same_side(wi, local.z) {
+                let mut scaled = Scaled {
+                    share: layer.share,
+                    tally: &mut *tally,
+                };
+                layer
+                    .closure
+                    .eval(layer.frame.to_local(wo), local, rng, &mut scaled);
+            }
+        }
+    }
+
+    /// The density of the mix for multiple importance sampling, sr⁻¹.
+    #[must_use]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let density = |layer: &Layer| {
+            let local = layer.frame.to_local(wi);
+            if self.same_side(wi, local.z) {
+                layer.closure.pdf(layer.frame.to_local(wo), local) * layer.share
+            } else {
+                0.0
+            }
+        };
+        let sum: f32 = self.layers.iter().map(density).sum();
+        if sum > 0.0 { sum / self.total } else { 0.0 }
+    }
+
+    fn choose(&self, choice: f32) -> Option<&Layer> {
+        let mut rest = choice * self.total;
+        for layer in &self.layers {
+            rest -= layer.share;
+            if rest < 0.0 {
+                return Some(layer);
+            }
+        }
+        // Rounding may leave a hair's breadth past the last one.
+        self.layers.last()
+    }
+
+    /// Interpolated normals make directions that are above the shading normal's
+    /// horizon and below the true surface's, or the other way round: such light
+    /// would leak through, so it is refused both when sampling and evaluating.
+    fn same_side(&self, wi: Vec3, local_z: f32) -> bool {
+        wi.dot(self.normal) * local_z > 0.0
+    }
+}
+
+/// Multiplies what it is given by a layer's share, and hands it on.
+struct Scaled<'a, T> {
+    share: f32,
+    tally: &'a mut T,
+}
+
+impl<T: Tally<f32>> Tally<f32> for Scaled<'_, T> {
+    #[inline]
+    fn add(&mut self, order: u32, value: model::Rgb<f32>) {
+        self.tally.add(order, value * self.share);
+    }
+}

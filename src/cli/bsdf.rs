@@ -1,0 +1,135 @@
+//! `smithwalk bsdf`: measurements of one material, for scripts.
+
+mod albedo;
+mod eval;
+mod sample;
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::process::ExitCode;
+
+use anyhow::ensure;
+use glam::Vec3;
+use smithwalk::bsdf::Layers;
+use smithwalk::color::Rgb;
+use smithwalk::description::{self, Estimator};
+use smithwalk::microsurface::Stream;
+use smithwalk::scene::{Material, Names, Surface, compile_material};
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Directional albedo: what share of the light comes back, and how often it met a facet
+    Albedo(albedo::Args),
+    /// f·|cosθ_i| for a pair of directions, in sr⁻¹
+    Eval(eval::Args),
+    /// Sampled directions with weights
+    Sample(sample::Args),
+}
+
+pub fn run(command: &Command, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Albedo(args) => albedo::run(args, out)?,
+        Command::Eval(args) => eval::run(args, out)?,
+        Command::Sample(args) => sample::run(args, out)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What all measurements take.
+#[derive(clap::Args)]
+struct MaterialArgs {
+    /// A material as in a scene file, e.g. 'conductor: {distribution: ggx, alpha: 0.5}'
+    #[arg(long, value_name = "YAML")]
+    material: String,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// JSON on one line; the only format there is
+    #[arg(long)]
+    json: bool,
+}
+
+impl MaterialArgs {
+    fn compile(&self, estimator: Estimator) -> anyhow::Result<Material> {
+        let material = description::Material::from_yaml(&self.material)?;
+        let names = Names {
+            materials: &BTreeMap::new(),
+            textures: &BTreeMap::new(),
+            estimator,
+        };
+        let compiled = compile_material(&material, &names)?;
+        ensure!(!compiled.emits(), "an emissive material does not scatter");
+        Ok(compiled)
+    }
+
+    fn rng(&self, stream: u64) -> Stream<rand_pcg::Pcg64Mcg> {
+        use rand::SeedableRng;
+        let seed = self
+            .seed
+            .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            .wrapping_add(stream);
+        Stream(rand_pcg::Pcg64Mcg::seed_from_u64(seed))
+    }
+}
+
+/// The closures of a horizontal surface seen from above or from below; the
+/// tangent is along x.
+fn layers(material: &Material, from_above: bool) -> Layers {
+    material.layers(&[], &Surface::horizontal(from_above))
+}
+
+fn parse_direction(text: &str) -> Result<Vec3, String> {
+    let parts: Vec<f32> = text
+        .split(',')
+        .map(|part| {
+            part.trim()
+                .parse()
+                .map_err(|_| format!("`{part}` is no number"))
+        })
+        .collect::<Result<_, _>>()?;
+    let [x, y, z] = parts[..] else {
+        return Err("expected three numbers, x,y,z".to_owned());
+    };
+    Vec3::new(x, y, z)
+        .as_dvec3()
+        .try_normalize()
+        .map(|v| v.as_vec3())
+        .ok_or_else(|| "the direction has no length".to_owned())
+}
+
+/// Mean and standard error of colours, summed in f64.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    sum: [f64; 3],
+    squares: [f64; 3],
+}
+
+impl Moments {
+    fn add(&mut self, value: Rgb) {
+        for (channel, x) in value.to_array().into_iter().enumerate() {
+            let x = f64::from(x);
+            self.sum[channel] += x;
+            self.squares[channel] += x * x;
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        for channel in 0..3 {
+            self.sum[channel] += other.sum[channel];
+            self.squares[channel] += other.squares[channel];
+        }
+    }
+
+    fn mean(&self, n: u64) -> [f64; 3] {
+        self.sum.map(|sum| sum / n as f64)
+    }
+
+    /// Standard error of the mean.
+    fn standard_error(&self, n: u64) -> [f64; 3] {
+        let n = n as f64;
+        [0, 1, 2].map(|c| {
+            let mean = self.sum[c] / n;
+            ((self.squares[c] / n - mean * mean).max(0.0) / (n - 1.0).max(1.0)).sqrt()
+        })
+    }
+}

@@ -1,0 +1,229 @@
+//! White objects in a white world, through the whole renderer.
+
+use std::collections::BTreeMap;
+use std::f32::consts::{PI, TAU};
+use std::io::Write;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::Context;
+use serde_json::{Value, json};
+use smithwalk::description::Description;
+use smithwalk::film::{Aov, Film, PixelFilter, Window};
+use smithwalk::integrator::{Limits, RenderRequest, render};
+use smithwalk::mesh::Mesh;
+use smithwalk::scene::{Assets, Scene, assemble};
+use smithwalk::texture::EnvironmentImage;
+
+use super::table::{ALPHAS, DISTRIBUTIONS, KINDS, white};
+
+/// What the pixels of a furnace show, mean of the channels.
+pub struct Furnace {
+    pub pixels: usize,
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub se: f64,
+    pub least: f64,
+    pub most: f64,
+}
+
+impl Furnace {
+    pub fn to_json(&self) -> Value {
+        json!({
+            "pixels": self.pixels, "mean": self.mean, "se": self.se,
+            "least": self.least, "most": self.most,
+        })
+    }
+}
+
+/// A white object.
+pub struct Row {
+    kind: &'static str,
+    distribution: &'static str,
+    alpha: [f32; 2],
+    shape: &'static str,
+    pub mean: f64,
+    pub se: f64,
+}
+
+impl Row {
+    pub fn to_json(&self) -> Value {
+        json!({
+            "material": self.kind, "distribution": self.distribution,
+            "alpha_x": self.alpha[0], "alpha_y": self.alpha[1],
+            "shape": self.shape, "mean": self.mean, "se": self.se,
+        })
+    }
+}
+
+/// Renders `scene` and averages the pixels that see a surface.
+pub fn render_furnace(
+    scene: &Scene,
+    description: &Description,
+    spp: u32,
+    seed: u64,
+) -> anyhow::Result<Furnace> {
+    let camera = scene.camera.as_ref().context("there is no `camera`")?;
+    let resolution = [description.film.width, description.film.height];
+    let aovs = [Aov::Depth, Aov::Variance].into_iter().collect();
+    let mut film = Film::new(resolution, Window::full(resolution), aovs);
+    let request = RenderRequest {
+        scene,
+        camera,
+        filter: &PixelFilter::box_filter(),
+        seed,
+        limits: Limits {
+            spp,
+            time: None,
+            noise: None,
+        },
+        all_in: false,
+        interrupt: &AtomicBool::new(false),
+    };
+    render(&request, &mut film, |_| ());
+    let image = film.develop();
+    let depth = image
+        .layer(Aov::Depth.name())
+        .and_then(|l| l.planes.first())
+        .context("no depth")?;
+    let variance = image.layer(Aov::Variance.name()).context("no variance")?;
+    let mean_of = |values: [f32; 3]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+    let seen: Vec<(f64, f64)> = (0..image.color.len())
+        .filter(|&i| depth[i] < 1e9)
+        .map(|i| {
+            let channels = [0, 1, 2].map(|c| variance.planes[c][i]);
+            // Channels share their paths: the mean of their variances, not its third.
+            (mean_of(image.color[i]), mean_of(channels))
+        })
+        .collect();
+    let n = seen.len().max(1) as f64;
+    Ok(Furnace {
+        pixels: seen.len(),
+        mean: seen.iter().map(|p| p.0).sum::<f64>() / n,
+        se: seen.iter().map(|p| p.1).sum::<f64>().sqrt() / n,
+        least: seen.iter().map(|p| p.0).fold(f64::INFINITY, f64::min),
+        most: seen.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max),
+    })
+}
+
+/// White spheres and planes in a world image of ones, so that light samples,
+/// evaluation and their combination with walks all take part.
+pub fn measure(spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for kind in KINDS {
+        for distribution in DISTRIBUTIONS {
+            for alpha in ALPHAS {
+                for shape in ["sphere", "plane"] {
+                    let text = format!(
+                        "smithwalk: 1\n\
+                         camera: {{projection: {{orthographic: {{scale: 1.3}}}}, transform: {{look_at: {{from: [0, -3, 1.5], to: [0, 0, 0]}}}}}}\n\
+                         film: {{width: 48, height: 48}}\n\
+                         sampling: {{max_bounces: 4096, roulette_start: 4096}}\n\
+                         world: {{environment: {{file: white.exr}}}}\n\
+                         materials: {{white: {{{}}}}}\n\
+                         meshes: {{shape: {{file: shape.obj}}}}\n\
+                         objects: [{{mesh: shape, material: white}}]\n",
+                        white(kind, distribution, alpha)
+                    );
+                    let description = Description::from_str(&text, "furnace", &[])?;
+                    let mesh = if shape == "sphere" { sphere() } else { plane() };
+                    let assets = Assets {
+                        meshes: BTreeMap::from([("shape".to_owned(), mesh)]),
+                        environment: Some(EnvironmentImage {
+                            width: 16,
+                            height: 8,
+                            pixels: vec![[1.0; 3]; 128],
+                        }),
+                        ..Assets::default()
+                    };
+                    let scene = assemble(&description, assets)?.scene;
+                    let furnace = render_furnace(&scene, &description, spp, seed)?;
+                    let Furnace { mean, se, .. } = furnace;
+                    rows.push(Row {
+                        kind,
+                        distribution,
+                        alpha,
+                        shape,
+                        mean,
+                        se,
+                    });
+                }
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// A flat-shaded sphere of radius 1: interpolated normals would let light leak
+/// at the silhouette, which is not what is measured here.
+fn sphere() -> Mesh {
+    const RINGS: u32 = 24;
+    const SEGMENTS: u32 = 48;
+    let vertex = |ring: u32, segment: u32| {
+        let (sin_t, cos_t) = (ring as f32 / RINGS as f32 * PI).sin_cos();
+        let (sin_p, cos_p) = ((segment % SEGMENTS) as f32 / SEGMENTS as f32 * TAU).sin_cos();
+        [sin_t * cos_p, sin_t * sin_p, cos_t]
+    };
+    let mut positions = Vec::new();
+    let mut uvs = Vec::new();
+    for ring in 0..=RINGS {
+        for segment in 0..=SEGMENTS {
+            positions.push(vertex(ring, segment));
+            uvs.push([
+                segment as f32 / SEGMENTS as f32,
+                1.0 - ring as f32 / RINGS as f32,
+            ]);
+        }
+    }
+    let index = |ring: u32, segment: u32| ring * (SEGMENTS + 1) + segment;
+    let mut triangles = Vec::new();
+    for ring in 0..RINGS {
+        for segment in 0..SEGMENTS {
+            let [a, b] = [index(ring, segment), index(ring, segment + 1)];
+            let [c, d] = [index(ring + 1, segment + 1), index(ring + 1, segment)];
+            if ring > 0 {
+                triangles.push([a, d, b]);
+            }
+            if ring + 1 < RINGS {
+                triangles.push([b, d, c]);
+            }
+        }
+    }
+    Mesh {
+        positions,
+        triangles,
+        uvs: Some(uvs),
+        ..Mesh::default()
+    }
+}
+
+/// A square of side 4 in the plane z = 0.
+fn plane() -> Mesh {
+    Mesh {
+        positions: vec![
+            [-2.0, -2.0, 0.0],
+            [2.0, -2.0, 0.0],
+            [2.0, 2.0, 0.0],
+            [-2.0, 2.0, 0.0],
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        uvs: Some(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]),
+        ..Mesh::default()
+    }
+}
+
+pub fn write(rows: &[Row], out: &mut dyn Write) -> anyhow::Result<()> {
+    writeln!(
+        out,
+        "\n{:<14} {:<9} {:>5} {:>5} {:>7}   {:>22}",
+        "material", "normals", "α_x", "α_y", "shape", "rendered"
+    )?;
+    for row in rows {
+        let [x, y] = row.alpha;
+        writeln!(
+            out,
+            "{:<14} {:<9} {x:>5} {y:>5} {:>7}   {:>10.6} ± {:>9.6}",
+            row.kind, row.distribution, row.shape, row.mean, row.se
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! The subcommands, one file each.
+
+mod bsdf;
+mod diff;
+mod furnace;
+mod info;
+mod render;
+mod scene;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Renders Blender scenes with multiple-scattering microfacet materials, and
+/// measures those materials.
+#[derive(Parser)]
+#[command(version, about, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene to EXR or PNG
+    Render(render::Args),
+    /// Show what a scene uses, what is left out, and what each costs
+    Info(info::Args),
+    /// Compare two images
+    Diff(diff::Args),
+    /// White furnace: what share of the light each material gives back
+    Furnace(furnace::Args),
+    /// Measure a material
+    #[command(subcommand)]
+    Bsdf(bsdf::Command),
+}
+
+impl Cli {
+    /// Runs the command; results go to `out`, remarks to `log`.
+    pub fn run(&self, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
+        match &self.command {
+            Command::Render(args) => render::run(args, out, log),
+            Command::Info(args) => info::run(args, out, log),
+            Command::Diff(args) => diff::run(args, out),
+            Command::Furnace(args) => furnace::run(args, out, log),
+            Command::Bsdf(command) => bsdf::run(command, out),
+        }
+    }
+}
+
+/// Whether the error is the reader of our output having gone away.
+pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,159 @@
+//! The image, the sampling and the surroundings.
+
+use super::value;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// Which version of Cycles the watts of lights are read as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightUnits {
+    /// As in Blender 4.0 and later.
+    #[default]
+    #[serde(rename = "cycles_4")]
+    Cycles4,
+    /// As in Blender 3.x.
+    #[serde(rename = "cycles_3")]
+    Cycles3,
+}
+
+/// The image.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Film {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// What a pixel averages over.
+    pub filter: Filter,
+    /// In stops; for PNG alone.
+    pub exposure: f32,
+    /// Further images, each once.
+    pub aovs: Vec<Aov>,
+}
+
+impl Default for Film {
+    fn default() -> Self {
+        Self {
+            width: 256,
+            height: 256,
+            filter: Filter::Box {},
+            exposure: 0.0,
+            aovs: Vec::new(),
+        }
+    }
+}
+
+/// A pixel filter, normalised to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Filter {
+    /// The pixel's own square.
+    Box {},
+    /// The Blackman-Harris window.
+    BlackmanHarris {
+        /// The full width, in pixels.
+        #[serde(default = "blackman_harris_width")]
+        width: f32,
+    },
+}
+
+fn blackman_harris_width() -> f32 {
+    1.5
+}
+
+/// An image beside the beauty pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Aov {
+    /// The reflectance of the first hit.
+    Albedo,
+    /// The shading normal of the first hit, in world space.
+    Normal,
+    /// The distance along the view axis, in metres.
+    Depth,
+    /// The variance of the pixel's mean.
+    Variance,
+    /// Light scattered once by every rough surface it met.
+    Single,
+    /// Light scattered more than once by some rough surface.
+    Multiple,
+}
+
+/// How many paths, how long, and by which estimator.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sampling {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// The seed of the random streams.
+    pub seed: u64,
+    /// Surface interactions after the first hit.
+    pub max_bounces: u32,
+    /// The first bounce at which Russian roulette may end a path.
+    pub roulette_start: u32,
+    /// How multiple scattering is estimated.
+    pub estimator: Estimator,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self {
+            spp: 64,
+            seed: 0,
+            max_bounces: 12,
+            roulette_start: 5,
+            estimator: Estimator::Auto,
+        }
+    }
+}
+
+/// How scattering at rough surfaces is estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// The best for the scene.
+    #[default]
+    Auto,
+    /// The unidirectional random walk.
+    Walk,
+    /// Walks from both sides, connected.
+    TwoWalk,
+    /// The position-free estimator.
+    PositionFree,
+    /// Single scattering alone, which loses energy.
+    Single,
+    /// Single scattering scaled to the right albedo.
+    Compensated,
+}
+
+/// What surrounds the scene.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum World {
+    /// The same radiance from everywhere.
+    Constant {
+        /// Scene-linear Rec. 709.
+        #[serde(default = "value::ones", deserialize_with = "value::triple")]
+        color: [f32; 3],
+        /// The factor that makes `color` a radiance in W·m⁻²·sr⁻¹.
+        #[serde(default = "value::one")]
+        strength: f32,
+    },
+    /// An equirectangular image.
+    Environment {
+        /// An EXR or HDR file, relative to the scene file.
+        file: PathBuf,
+        /// The factor that makes the image a radiance in W·m⁻²·sr⁻¹.
+        #[serde(default = "value::one")]
+        strength: f32,
+        /// A further factor per channel.
+        #[serde(default = "value::ones", deserialize_with = "value::triple")]
+        color: [f32; 3],
+        /// Euler angles in degrees, about x first, then y, then z, applied to
+        /// directions before the image is looked up.
+        #[serde(default)]
+        rotation: [f32; 3],
+    },
+}

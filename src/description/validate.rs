@@ -1,0 +1,611 @@
+//! What types can't say: ranges, references and shapes that make no sense.
+
+use super::document::{Node, Step, dotted};
+use super::problem::{Place, Sources, nearest};
+use super::{
+    Aperture, AreaShape, Assignment, Camera, Color, Conductor, Description, Film, Filter, Light,
+    LightKind, Material, MaterialRef, Object, Opening, Projection, Reflectance, Rough, Roughness,
+    Sampling, Scalar, Texture, Transform, World,
+};
+use std::collections::BTreeSet;
+
+/// In pixels. More would need over 10 GB for the sums alone.
+const MAX_SIDE: u32 = 32_768;
+
+/// Checks a description against the tree it came from.
+pub(super) fn description(description: &Description, tree: &Node, sources: &mut Sources) {
+    let mut check = Check {
+        tree,
+        sources,
+        in_scene: true,
+    };
+    let root = At::root();
+    if description.version != 1 {
+        check.report(
+            root.key("smithwalk"),
+            format!("expected version 1, found {}", description.version),
+        );
+    }
+    if let Some(camera) = &description.camera {
+        check.camera(camera, root.key("camera"));
+    }
+    check.film(&description.film, root.key("film"));
+    check.sampling(&description.sampling, root.key("sampling"));
+    if let Some(world) = &description.world {
+        check.world(world, root.key("world"));
+    }
+    for (name, texture) in &description.textures {
+        check.texture(texture, root.key("textures").key(name));
+    }
+    for (name, material) in &description.materials {
+        check.material(material, root.key("materials").key(name));
+    }
+    check.cycles(description);
+    for (index, object) in description.objects.iter().enumerate() {
+        check.object(object, root.key("objects").index(index));
+    }
+    for (index, light) in description.lights.iter().enumerate() {
+        check.light(light, root.key("lights").index(index));
+    }
+}
+
+/// Checks a material that stands alone.
+pub(super) fn material(material: &Material, tree: &Node, sources: &mut Sources) {
+    Check {
+        tree,
+        sources,
+        in_scene: false,
+    }
+    .material(material, At::root());
+}
+
+/// A path into the tree as it was deserialised.
+#[derive(Clone)]
+struct At(Vec<Step>);
+
+impl At {
+    fn root() -> Self {
+        Self(Vec::new())
+    }
+
+    fn key(&self, key: &str) -> Self {
+        Self([&self.0[..], &[Step::Key(key.to_owned())]].concat())
+    }
+
+    fn index(&self, index: usize) -> Self {
+        Self([&self.0[..], &[Step::Index(index)]].concat())
+    }
+}
+
+/// The values a number may have.
+#[derive(Clone, Copy)]
+enum Range {
+    Positive,
+    NonNegative,
+    /// Both ends included.
+    Within(f32, f32),
+    /// The upper end included.
+    Above(f32, f32),
+    /// Neither end included.
+    Between(f32, f32),
+}
+
+impl Range {
+    const UNIT: Self = Self::Within(0.0, 1.0);
+
+    fn contains(self, value: f32) -> bool {
+        match self {
+            Self::Positive => value > 0.0,
+            Self::NonNegative => value >= 0.0,
+            Self::Within(low, high) => low <= value && value <= high,
+            Self::Above(low, high) => low < value && value <= high,
+            Self::Between(low, high) => low < value && value < high,
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Self::Positive => "a number above 0".to_owned(),
+            Self::NonNegative => "a number, 0 or more".to_owned(),
+            Self::Within(low, high) => format!("a number from {low} to {high}"),
+            Self::Above(low, high) => format!("a number above {low} and up to {high}"),
+            Self::Between(low, high) => format!("a number above {low} and below {high}"),
+        }
+    }
+}
+
+/// What transforms are for: those that look need a direction, those that hold
+/// surfaces a volume.
+#[derive(Clone, Copy, PartialEq)]
+enum Use {
+    Surface,
+    Direction,
+}
+
+struct Check<'a> {
+    tree: &'a Node,
+    sources: &'a mut Sources,
+    /// Whether there are materials and textures to name.
+    in_scene: bool,
+}
+
+impl Check<'_> {
+    fn report(&mut self, at: At, message: String) {
+        self.report_near(at, message, None);
+    }
+
+    fn report_near(&mut self, At(steps): At, message: String, nearest: Option<String>) {
+        let (node, path) = self.tree.descend(&steps);
+        // A value that the file leaves out has the place of what lacks it.
+        let place: Place = node.place;
+        self.sources.report(place, dotted(&path), message, nearest);
+    }
+
+    fn number(&mut self, value: f32, range: Range, at: At) {
+        if !range.contains(value) {
+            self.report(at, format!("expected {}, found {value}", range.words()));
+        }
+    }
+
+    fn scalar(&mut self, scalar: &Scalar, range: Range, at: At) {
+        match scalar {
+            Scalar::Value(value) => self.number(*value, range, at),
+            Scalar::Texture { name, .. } => {
+                self.reference("textures", "texture", name, at.key("texture"))
+            }
+        }
+    }
+
+    /// A colour whose channels are all in one range.
+    fn triple(&mut self, channels: [f32; 3], range: Range, at: At) {
+        if let Some(value) = channels.into_iter().find(|&value| !range.contains(value)) {
+            self.report(
+                at,
+                format!("expected {} in each channel, found {value}", range.words()),
+            );
+        }
+    }
+
+    fn color(&mut self, color: &Color, range: Range, at: At) {
+        match color {
+            Color::Value(channels) => self.triple(*channels, range, at),
+            Color::Texture(name) => self.reference("textures", "texture", name, at.key("texture")),
+        }
+    }
+
+    /// Names of faulty things are known, too: the fault is enough to report.
+    fn reference(&mut self, section: &str, what: &str, name: &str, at: At) {
+        if !self.in_scene {
+            self.report(
+                at,
+                format!(
+                    "expected a value, found the {what} `{name}`: there is no scene to take it from"
+                ),
+            );
+            return;
+        }
+        let names = self
+            .tree
+            .get(section)
+            .map(Node::entries)
+            .unwrap_or_default();
+        if names.iter().any(|(key, _)| key.name == name) {
+            return;
+        }
+        let nearest = nearest(name, names.iter().map(|(key, _)| key.name.as_str()));
+        self.report_near(at, format!("there is no {what} `{name}`"), nearest);
+    }
+
+    fn transform(&mut self, transform: &Transform, usage: Use, at: At) {
+        match *transform {
+            Transform::LookAt { from, to, up } => {
+                let at = at.key("look_at");
+                let [from, to, up] = [from, to, up].map(|v| glam::DVec3::from(v.map(f64::from)));
+                let along = to - from;
+                if along.length() == 0.0 {
+                    self.report(
+                        at.key("to"),
+                        "`from` and `to` are the same point".to_owned(),
+                    );
+                } else if up.length() == 0.0 {
+                    self.report(
+                        at.key("up"),
+                        "expected a direction, found the zero vector".to_owned(),
+                    );
+                } else if along.normalize().cross(up.normalize()).length() < 1e-6 {
+                    let message =
+                        "`up` is parallel to the direction from `from` to `to`".to_owned();
+                    self.report(
+                        if self.given(&at, "up") {
+                            at.key("up")
+                        } else {
+                            at
+                        },
+                        message,
+                    );
+                }
+            }
+            Transform::Parts { scale, .. } => {
+                if usage == Use::Surface && scale.contains(&0.0) {
+                    self.report(
+                        at.key("scale"),
+                        "expected factors other than 0: this flattens the object".to_owned(),
+                    );
+                }
+            }
+            Transform::Matrix(rows) => {
+                let at = at.key("matrix");
+                if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+                    self.report(at.index(3), "expected the last row [0, 0, 0, 1]".to_owned());
+                    return;
+                }
+                let column = |c: usize| {
+                    glam::DVec3::new(rows[0][c].into(), rows[1][c].into(), rows[2][c].into())
+                };
+                let [x, y, z] = [column(0), column(1), column(2)];
+                // The volume of the unit cube's image, relative to its edges.
+                let volume = x.dot(y.cross(z)).abs();
+                let edges = x.length() * y.length() * z.length();
+                if edges == 0.0 || volume < 1e-9 * edges {
+                    self.report(
+                        at,
+                        "this matrix has no inverse: it flattens what it is applied to".to_owned(),
+                    );
+                }
+            }
+        }
+    }
+
+    fn given(&self, At(steps): &At, key: &str) -> bool {
+        self.tree.descend(steps).0.get(key).is_some()
+    }
+
+    fn camera(&mut self, camera: &Camera, at: At) {
+        self.transform(&camera.transform, Use::Direction, at.key("transform"));
+        let projection = at.key("projection");
+        match &camera.projection {
+            Projection::Perspective(perspective) => {
+                let at = projection.key("perspective");
+                match perspective.opening {
+                    Opening::Fov(degrees) => {
+                        self.number(degrees, Range::Between(0.0, 180.0), at.key("fov"))
+                    }
+                    Opening::Lens(millimetres) => {
+                        self.number(millimetres, Range::Positive, at.key("lens"))
+                    }
+                }
+                self.number(
+                    perspective.sensor_width,
+                    Range::Positive,
+                    at.key("sensor_width"),
+                );
+                self.number(
+                    perspective.sensor_height,
+                    Range::Positive,
+                    at.key("sensor_height"),
+                );
+                self.number(
+                    perspective.pixel_aspect,
+                    Range::Positive,
+                    at.key("pixel_aspect"),
+                );
+            }
+            Projection::Orthographic(orthographic) => {
+                self.number(
+                    orthographic.scale,
+                    Range::Positive,
+                    projection.key("orthographic").key("scale"),
+                );
+            }
+        }
+        if let Some(lens) = &camera.depth_of_field {
+            let at = at.key("depth_of_field");
+            match lens.aperture {
+                Aperture::FStop(fstop) => self.number(fstop, Range::Positive, at.key("fstop")),
+                Aperture::Radius(metres) => {
+                    self.number(metres, Range::NonNegative, at.key("aperture_radius"))
+                }
+            }
+            self.number(
+                lens.focus_distance,
+                Range::Positive,
+                at.key("focus_distance"),
+            );
+        }
+    }
+
+    fn film(&mut self, film: &Film, at: At) {
+        for (key, side) in [("width", film.width), ("height", film.height)] {
+            if !(1..=MAX_SIDE).contains(&side) {
+                self.report(
+                    at.key(key),
+                    format!("expected 1 to {MAX_SIDE} pixels, found {side}"),
+                );
+            }
+        }
+        if let Filter::BlackmanHarris { width } = film.filter {
+            let at = at.key("filter").key("blackman_harris").key("width");
+            self.number(width, Range::Above(0.0, 16.0), at);
+        }
+        self.number(
+            film.exposure,
+            Range::Within(-32.0, 32.0),
+            at.key("exposure"),
+        );
+        let mut seen = BTreeSet::new();
+        for (index, aov) in film.aovs.iter().enumerate() {
+            if !seen.insert(*aov) {
+                self.report(
+                    at.key("aovs").index(index),
+                    "this image is asked for twice".to_owned(),
+                );
+            }
+        }
+    }
+
+    fn sampling(&mut self, sampling: &Sampling, at: At) {
+        if sampling.spp == 0 {
+            self.report(
+                at.key("spp"),
+                "expected at least 1 sample per pixel, found 0".to_owned(),
+            );
+        }
+    }
+
+    fn world(&mut self, world: &World, at: At) {
+        let (kind, color, strength) = match world {
+            World::Constant { color, strength } => ("constant", *color, *strength),
+            World::Environment {
+                color, strength, ..
+            } => ("environment", *color, *strength),
+        };
+        self.triple(color, Range::NonNegative, at.key(kind).key("color"));
+        self.number(strength, Range::NonNegative, at.key(kind).key("strength"));
+    }
+
+    fn texture(&mut self, texture: &Texture, at: At) {
+        if texture.scale.contains(&0.0) {
+            self.report(at.key("scale"), "expected factors other than 0".to_owned());
+        }
+    }
+
+    fn material(&mut self, material: &Material, at: At) {
+        match material {
+            Material::Conductor(conductor) => self.conductor(conductor, at.key("conductor")),
+            Material::Dielectric(dielectric) => {
+                let at = at.key("dielectric");
+                self.rough(&dielectric.rough, &at);
+                self.number(dielectric.ior, Range::Positive, at.key("ior"));
+                self.color(&dielectric.color, Range::UNIT, at.key("color"));
+            }
+            Material::RoughDiffuse(diffuse) => {
+                let at = at.key("rough_diffuse");
+                self.rough(&diffuse.rough, &at);
+                self.color(&diffuse.color, Range::UNIT, at.key("color"));
+            }
+            Material::Diffuse(diffuse) => {
+                self.color(&diffuse.color, Range::UNIT, at.key("diffuse").key("color"))
+            }
+            Material::Emission(emission) => {
+                let at = at.key("emission");
+                self.color(&emission.color, Range::NonNegative, at.key("color"));
+                self.number(emission.strength, Range::NonNegative, at.key("strength"));
+            }
+            Material::Transparent(transparent) => {
+                self.triple(
+                    transparent.color,
+                    Range::UNIT,
+                    at.key("transparent").key("color"),
+                );
+            }
+            Material::Mix(mix) => {
+                let at = at.key("mix");
+                self.scalar(&mix.factor, Range::UNIT, at.key("factor"));
+                for (key, part) in [("a", &mix.a), ("b", &mix.b)] {
+                    match part {
+                        MaterialRef::Name(name) => {
+                            self.reference("materials", "material", name, at.key(key))
+                        }
+                        MaterialRef::Inline(material) => self.material(material, at.key(key)),
+                    }
+                }
+            }
+        }
+    }
+
+    fn conductor(&mut self, conductor: &Conductor, at: At) {
+        self.rough(&conductor.rough, &at);
+        match &conductor.reflectance {
+            Reflectance::Color(color) => self.color(color, Range::UNIT, at.key("color")),
+            Reflectance::Metal(_) => {}
+            Reflectance::Complex { eta, k } => {
+                self.triple(*eta, Range::Positive, at.key("eta"));
+                self.triple(*k, Range::NonNegative, at.key("k"));
+            }
+            Reflectance::Schlick { f0 } => self.triple(*f0, Range::UNIT, at.key("f0")),
+            Reflectance::F82 { f0, f82 } => {
+                self.triple(*f0, Range::UNIT, at.key("f0"));
+                self.triple(*f82, Range::UNIT, at.key("f82"));
+            }
+        }
+    }
+
+    fn rough(&mut self, rough: &Rough, at: &At) {
+        match &rough.roughness {
+            Roughness::Alpha(alpha) => self.scalar(alpha, Range::NonNegative, at.key("alpha")),
+            Roughness::AlphaXy { x, y } => {
+                self.scalar(x, Range::NonNegative, at.key("alpha_x"));
+                self.scalar(y, Range::NonNegative, at.key("alpha_y"));
+                self.smooth_in_one_direction(x, y, at.key("alpha_y"));
+            }
+            Roughness::Blender {
+                roughness,
+                anisotropy,
+            } => {
+                self.scalar(roughness, Range::UNIT, at.key("roughness"));
+                self.scalar(anisotropy, Range::Within(-1.0, 1.0), at.key("anisotropy"));
+            }
+        }
+        self.scalar(
+            &rough.rotation,
+            Range::Within(-1.0, 1.0),
+            at.key("rotation"),
+        );
+    }
+
+    fn smooth_in_one_direction(&mut self, x: &Scalar, y: &Scalar, at: At) {
+        if let (Scalar::Value(x), Scalar::Value(y)) = (x, y) {
+            if (*x == 0.0) != (*y == 0.0) {
+                self.report(
+                    at,
+                    "expected `alpha_x` and `alpha_y` both 0 or both above 0".to_owned(),
+                );
+            }
+        }
+    }
+
+    /// Mixes that contain themselves.
+    fn cycles(&mut self, description: &Description) {
+        let mut done = BTreeSet::new();
+        for name in description.materials.keys() {
+            let mut trail = Vec::new();
+            if let Some(endless) = find_endless(description, name, &mut trail, &mut done) {
+                let at = At::root().key("materials").key(name);
+                let message = match endless {
+                    Endless::Cycle(names) => {
+                        format!("this mix contains itself: {}", names.join(" → "))
+                    }
+                    Endless::Deep => format!("mixes are nested more than {MAX_MIXES} deep"),
+                };
+                self.report(at, message);
+            }
+        }
+    }
+
+    fn object(&mut self, object: &Object, at: At) {
+        self.reference("meshes", "mesh", &object.mesh, at.key("mesh"));
+        self.transform(&object.transform, Use::Surface, at.key("transform"));
+        match &object.materials {
+            Assignment::All(name) => {
+                self.reference("materials", "material", name, at.key("material"))
+            }
+            Assignment::BySlot(slots) => {
+                for (slot, name) in slots {
+                    self.reference("materials", "material", name, at.key("materials").key(slot));
+                }
+            }
+            Assignment::FromMesh => {}
+        }
+    }
+
+    fn light(&mut self, light: &Light, at: At) {
+        let at = match light.kind {
+            LightKind::Point { power, radius, .. } => {
+                let at = at.key("point");
+                self.number(power, Range::NonNegative, at.key("power"));
+                self.number(radius, Range::NonNegative, at.key("radius"));
+                at
+            }
+            LightKind::Spot {
+                power,
+                size,
+                blend,
+                radius,
+            } => {
+                let at = at.key("spot");
+                self.number(power, Range::NonNegative, at.key("power"));
+                self.number(size, Range::Above(0.0, 180.0), at.key("size"));
+                self.number(blend, Range::UNIT, at.key("blend"));
+                self.number(radius, Range::NonNegative, at.key("radius"));
+                at
+            }
+            LightKind::Sun { strength, angle } => {
+                let at = at.key("sun");
+                self.number(strength, Range::NonNegative, at.key("strength"));
+                self.number(angle, Range::Within(0.0, 180.0), at.key("angle"));
+                at
+            }
+            LightKind::Area {
+                power,
+                shape,
+                spread,
+            } => {
+                let at = at.key("area");
+                self.number(power, Range::NonNegative, at.key("power"));
+                self.number(spread, Range::Above(0.0, 180.0), at.key("spread"));
+                let (kind, width, height) = match shape {
+                    AreaShape::Rectangle { width, height } => ("rectangle", width, height),
+                    AreaShape::Disk { width, height } => ("disk", width, height),
+                };
+                let shape = at.key("shape").key(kind);
+                self.number(width, Range::Positive, shape.key("width"));
+                self.number(height, Range::Positive, shape.key("height"));
+                at
+            }
+        };
+        let usage = match light.kind {
+            LightKind::Area { .. } => Use::Surface,
+            _ => Use::Direction,
+        };
+        self.transform(&light.transform, usage, at.key("transform"));
+        self.triple(light.color, Range::NonNegative, at.key("color"));
+        self.number(
+            light.exposure,
+            Range::Within(-32.0, 32.0),
+            at.key("exposure"),
+        );
+    }
+}
+
+/// Deeper mixes are mistakes, and shading them would overflow the stack.
+const MAX_MIXES: usize = 64;
+
+/// A trail of mixes that can't be shaded.
+enum Endless {
+    Cycle(Vec<String>),
+    Deep,
+}
+
+/// Follows the names in mixes from one material on, to the first trail that
+/// returns to where it was before.
+fn find_endless(
+    description: &Description,
+    name: &str,
+    trail: &mut Vec<String>,
+    done: &mut BTreeSet<String>,
+) -> Option<Endless> {
+    if let Some(start) = trail.iter().position(|earlier| earlier == name) {
+        done.extend(trail.iter().cloned());
+        return Some(Endless::Cycle(
+            [&trail[start..], &[name.to_owned()]].concat(),
+        ));
+    }
+    if trail.len() == MAX_MIXES {
+        done.extend(trail.iter().cloned());
+        return Some(Endless::Deep);
+    }
+    if done.contains(name) {
+        return None;
+    }
+    trail.push(name.to_owned());
+    let mut names = Vec::new();
+    if let Some(material) = description.materials.get(name) {
+        mixed_names(material, &mut names);
+    }
+    let cycle = names
+        .into_iter()
+        .find_map(|next| find_endless(description, next, trail, done));
+    trail.pop();
+    done.insert(name.to_owned());
+    cycle
+}
+
+fn mixed_names<'a>(material: &'a Material, names: &mut Vec<&'a str>) {
+    let Material::Mix(mix) = material else { return };
+    for part in [&mix.a, &mix.b] {
+        match part {
+            MaterialRef::Name(name) => names.push(name),
+            MaterialRef::Inline(material) => mixed_names(material, names),
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! Triangle meshes and instances, committed and ready for ray queries.
+
+use std::ops::Deref;
+use std::sync::Arc;
+
+use embree4_sys as sys;
+use glam::Affine3A;
+
+use super::device::{Device, EmbreeError};
+use super::ray::{Hit, PaddedRayHit, Ray};
+
+/// Vertex positions, in metres, laid out so that Embree can read them in place.
+///
+/// Embree loads sixteen bytes for each vertex of twelve: four past the last
+/// one. The buffer always has room for one vertex more than it holds.
+#[derive(Clone, Debug, Default)]
+pub struct Vertices(Vec<[f32; 3]>);
+
+impl From<Vec<[f32; 3]>> for Vertices {
+    fn from(mut positions: Vec<[f32; 3]>) -> Self {
+        positions.reserve_exact(1);
+        // Embree ignores what it reads there, but it should not be uninitialised.
+        positions.push([0.0; 3]);
+        Self(positions)
+    }
+}
+
+impl Deref for Vertices {
+    type Target = [[f32; 3]];
+
+    fn deref(&self) -> &[[f32; 3]] {
+        self.0.split_last().map_or(&[], |(_, positions)| positions)
+    }
+}
+
+/// One thing that rays can meet.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// Triangles where their vertices say.
+    Mesh {
+        /// Positions in world space.
+        vertices: Arc<Vertices>,
+        /// Three vertex indices for each triangle.
+        triangles: Arc<Vec<[u32; 3]>>,
+    },
+    /// Another placing of triangles that several geometries share.
+    Instance {
+        /// Index into the accelerator's list of shared meshes.
+        shared: usize,
+        /// Object space to world space.
+        to_world: Affine3A,
+    },
+}
+
+/// A handle on an Embree scene, released when dropped.
+#[derive(Debug)]
+struct RawScene(sys::RTCScene);
+
+impl RawScene {
+    fn new(device: &Device) -> Result<Self, EmbreeError> {
+        // SAFETY: the device is valid.
+        let raw = unsafe { sys::rtcNewScene(device.raw()) };
+        device.check()?;
+        let scene = Self(raw);
+        // Robust: a ray through a shared edge must not slip between two triangles.
+        // SAFETY: the scene is valid and not committed yet.
+        unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTCSceneFlags::ROBUST) };
+        Ok(scene)
+    }
+
+    /// Attaches `geometry` as number `id` and hands it over to the scene.
+    fn attach(&self, geometry: sys::RTCGeometry, id: u32) {
+        // SAFETY: both handles are valid; the scene keeps a reference of its own.
+        unsafe {
+            sys::rtcCommitGeometry(geometry);
+            sys::rtcAttachGeometryByID(self.0, geometry, id);
+            sys::rtcReleaseGeometry(geometry);
+        }
+    }
+
+    fn commit(&self, device: &Device) -> Result<(), EmbreeError> {
+        // SAFETY: the scene is valid.
+        unsafe { sys::rtcCommitScene(self.0) };
+        device.check()
+    }
+}
+
+impl Drop for RawScene {
+    fn drop(&mut self) {
+        // SAFETY: the handle was made by `new` and is released once.
+        unsafe { sys::rtcReleaseScene(self.0) };
+    }
+}
+
+/// A committed scene. Queries are read-only and thread safe.
+#[derive(Debug)]
+pub struct Accelerator {
+    root: RawScene,
+    /// Scenes that instances refer to, and the buffers that Embree reads in
+    /// place: kept for as long as the root scene is.
+    _shared: Vec<RawScene>,
+    _buffers: Vec<SharedMesh>,
+    _device: Arc<Device>,
+}
+
+// SAFETY: Embree's queries on a committed scene are thread safe, nothing here
+// changes a scene after `build`, and the buffers are immutable behind `Arc`.
+unsafe impl Send for Accelerator {}
+// SAFETY: as above.
+unsafe impl Sync for Accelerator {}
+
+/// Vertices and triangles that instances share.
+pub type SharedMesh = (Arc<Vertices>, Arc<Vec<[u32; 3]>>);
+
+impl Accelerator {
+    /// Builds the acceleration structures. `geometries[i]` answers as geometry
+    /// `i` in a [`Hit`]; instances refer to `shared`.
+    ///
+    /// # Errors
+    /// When an index is out of range or Embree runs out of memory.
+    pub fn build(
+        device: Arc<Device>,
+        shared: &[SharedMesh],
+        geometries: &[Geometry],
+    ) -> Result<Self, EmbreeError> {
+        let mut buffers = Vec::new();
+        let mut shared_scenes = Vec::with_capacity(shared.len());
+        for (vertices, triangles) in shared {
+            let scene = RawScene::new(&device)?;
+            let mesh = new_mesh(&device, vertices, triangles)?;
+            buffers.push((Arc::clone(vertices), Arc::clone(triangles)));
+            scene.attach(mesh, 0);
+            scene.commit(&device)?;
+            shared_scenes.push(scene);
+        }
+        let root = RawScene::new(&device)?;
+        for (id, geometry) in (0u32..).zip(geometries) {
+            let raw = match geometry {
+                Geometry::Mesh {
+                    vertices,
+                    triangles,
+                } => {
+                    buffers.push((Arc::clone(vertices), Arc::clone(triangles)));
+                    new_mesh(&device, vertices, triangles)?
+                }
+                Geometry::Instance {
+                    shared: index,
+                    to_world,
+                } => {
+                    let child = shared_scenes.get(*index).ok_or(EmbreeError::NoSuchMesh {
+                        index: *index,
+                        meshes: shared_scenes.len(),
+                    })?;
+                    new_instance(&device, child, to_world)
+                }
+            };
+            root.attach(raw, id);
+        }
+        root.commit(&device)?;
+        Ok(Self {
+            root,
+            _shared: shared_scenes,
+            _buffers: buffers,
+            _device: device,
+        })
+    }
+
+    /// The nearest hit along `ray`, if there is one.
+    #[must_use]
+    #[inline]
+    pub fn intersect(&self, ray: Ray) -> Option<Hit> {
+        let hit = self.query(ray);
+        if hit.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
+            return None;
+        }
+        // A shared mesh is geometry 0 of its own scene; the instance has the number.
+        let instance = hit.hit.instID[0];
+        let geometry = if instance == sys::RTC_INVALID_GEOMETRY_ID {
+            hit.hit.geomID
+        } else {
+            instance
+        };
+        Some(Hit {
+            t: hit.ray.tfar,
+            u: hit.hit.u,
+            v: hit.hit.v,
+            triangle: hit.hit.primID,
+            geometry,
+        })
+    }
+
+    fn query(&self, ray: Ray) -> PaddedRayHit {
+        let mut record = PaddedRayHit::new(ray);
+        // SAFETY: the record begins like an RTCRayHit, is aligned to 16 bytes and
+        // has room for the fields that newer libraries write behind it; the
+        // scene is committed; null arguments mean the defaults.
+        unsafe {
+            sys::rtcIntersect1(self.root.0, (&raw mut record).cast(), std::ptr::null_mut());
+        }
+        record
+    }
+
+    /// Whether anything lies on `ray`'s segment.
+    #[must_use]
+    #[inline]
+    pub fn occluded(&self, ray: Ray) -> bool {
+        let mut record = ray.to_embree();
+        // SAFETY: RTCRay has the library's size and alignment (repr(C, align(16))
+        // in the bindings); the scene is committed; null means the defaults.
+        unsafe { sys::rtcOccluded1(self.root.0, &raw mut record, std::ptr::null_mut()) };
+        // Embree marks an occluded ray with −∞.
+        record.tfar < 0.0
+    }
+
+    /// The corners of the box round everything, or `None` for an empty scene.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(glam::Vec3, glam::Vec3)> {
+        let mut b = sys::RTCBounds {
+            lower_x: 0.0,
+            lower_y: 0.0,
+            lower_z: 0.0,
+            align0: 0.0,
+            upper_x: 0.0,
+            upper_y: 0.0,
+            upper_z: 0.0,
+            align1: 0.0,
+        };
+        // SAFETY: the scene is committed and `b` is a valid place to write.
+        unsafe { sys::rtcGetSceneBounds(self.root.0, &raw mut b) };
+        let low = glam::Vec3::new(b.lower_x, b.lower_y, b.lower_z);
+        let high = glam::Vec3::new(b.upper_x, b.upper_y, b.upper_z);
+        low.cmple(high).all().then_some((low, high))
+    }
+}
+
+fn new_mesh(
+    device: &Device,
+    vertices: &Vertices,
+    triangles: &[[u32; 3]],
+) -> Result<sys::RTCGeometry, EmbreeError> {
+    let count = vertices.len();
+    for (triangle, corners) in triangles.iter().enumerate() {
+        if let Some(&index) = corners.iter().find(|&&i| i as usize >= count) {
+            return Err(EmbreeError::IndexOutOfRange {
+                triangle,
+                index,
+                vertices: count,
+            });
+        }
+    }
+    // SAFETY: the device is valid. The buffers outlive the geometry (the
+    // accelerator keeps both `Arc`s), `Vertices` is padded for sixteen-byte
+    // loads, and every index was checked above.
+    let geometry = unsafe {
+        let geometry = sys::rtcNewGeometry(device.raw(), sys::RTCGeometryType::TRIANGLE);
+        sys::rtcSetSharedGeometryBuffer(
+            geometry,
+            sys::RTCBufferType::VERTEX,
+            0,
+            sys::RTCFormat::FLOAT3,
+            vertices.0.as_ptr().cast(),
+            0,
+            size_of::<[f32; 3]>(),
+            count,
+        );
+        sys::rtcSetSharedGeometryBuffer(
+            geometry,
+            sys::RTCBufferType::INDEX,
+            0,
+            sys::RTCFormat::UINT3,
+            triangles.as_ptr().cast(),
+            0,
+            size_of::<[u32; 3]>(),
+            triangles.len(),
+        );
+        geometry
+    };
+    device.check()?;
+    Ok(geometry)
+}
+
+fn new_instance(device: &Device, child: &RawScene, to_world: &Affine3A) -> sys::RTCGeometry {
+    let columns = to_world.to_cols_array();
+    // SAFETY: device and child scene are valid, and Embree copies the matrix.
+    unsafe {
+        let geometry = sys::rtcNewGeometry(device.raw(), sys::RTCGeometryType::INSTANCE);
+        sys::rtcSetGeometryInstancedScene(geometry, child.0);
+        sys::rtcSetGeometryTransform(
+            geometry,
+            0,
+            sys::RTCFormat::FLOAT3X4_COLUMN_MAJOR,
+            columns.as_ptr().cast(),
+        );
+        geometry
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::super::ray::CANARY;
+    use super::*;
+
+    fn unit_triangle() -> SharedMesh {
+        let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        (Arc::new(vertices.into()), Arc::new(vec![[0, 1, 2]]))
+    }
+
+    fn device() -> Arc<Device> {
+        Arc::new(Device::new(1).expect("Embree is installed"))
+    }
+
+    fn mesh() -> Accelerator {
+        let (vertices, triangles) = unit_triangle();
+        Accelerator::build(
+            device(),
+            &[],
+            &[Geometry::Mesh {
+                vertices,
+                triangles,
+            }],
+        )
+        .expect("a valid mesh")
+    }
+
+    const DOWN: Vec3 = vec3(0.0, 0.0, -1.0);
+
+    #[test]
+    fn finds_the_hit_and_its_barycentric_weights() {
+        let hit = mesh()
+            .intersect(Ray::new(vec3(0.25, 0.5, 2.0), DOWN))
+            .expect("above it");
+        assert_eq!((hit.geometry, hit.triangle), (0, 0));
+        assert!((hit.t - 2.0).abs() < 1e-6 && (hit.u - 0.25).abs() < 1e-6);
+        assert!((hit.v - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn misses_beside_the_triangle_and_beyond_the_segment() {
+        let scene = mesh();
+        assert!(
+            scene
+                .intersect(Ray::new(vec3(0.75, 0.75, 2.0), DOWN))
+                .is_none()
+        );
+        let mut ray = Ray::new(vec3(0.25, 0.25, 2.0), DOWN);
+        assert!(scene.occluded(ray));
+        ray.t_far = 1.9;
+        assert!(!scene.occluded(ray) && scene.intersect(ray).is_none());
+    }
+
+    /// The library writes one field past the bindings' record and no more: the
+    /// padding is needed, and it is enough.
+    #[test]
+    fn the_padding_takes_what_the_library_writes_past_the_record() {
+        let (vertices, triangles) = unit_triangle();
+        let scene = Accelerator::build(
+            device(),
+            &[(vertices, triangles)],
+            &[Geometry::Instance {
+                shared: 0,
+                to_world: Affine3A::IDENTITY,
+            }],
+        )
+        .expect("a valid instance");
+        let record = scene.query(Ray::new(vec3(0.25, 0.25, 2.0), DOWN));
+        assert_eq!(record.hit.instID[0], 0);
+        assert_ne!(
+            record.pad[0], CANARY,
+            "this Embree writes no instPrimID: is it older than 4.3?"
+        );
+        assert_eq!(
+            record.pad[1..],
+            [CANARY; 3],
+            "Embree writes further than the padding allows for"
+        );
+    }
+
+    #[test]
+    fn instances_answer_with_their_own_number_and_place() {
+        let shared = [unit_triangle()];
+        let place = |x| Geometry::Instance {
+            shared: 0,
+            to_world: Affine3A::from_translation(vec3(x, 0.0, 0.0)),
+        };
+        let scene =
+            Accelerator::build(device(), &shared, &[place(0.0), place(5.0)]).expect("valid");
+        let hit = scene
+            .intersect(Ray::new(vec3(5.25, 0.25, 1.0), DOWN))
+            .expect("the second one");
+        assert_eq!(hit.geometry, 1);
+        let (low, high) = scene.bounds().expect("not empty");
+        assert_eq!((low, high), (Vec3::ZERO, vec3(6.0, 1.0, 0.0)));
+    }
+
+    #[test]
+    fn an_index_out_of_range_is_an_error_and_never_reaches_the_library() {
+        let (vertices, _) = unit_triangle();
+        let triangles = Arc::new(vec![[0, 1, 2], [0, 1, 3]]);
+        let error = Accelerator::build(
+            device(),
+            &[],
+            &[Geometry::Mesh {
+                vertices,
+                triangles,
+            }],
+        )
+        .expect_err("vertex 3 of 3");
+        assert!(
+            error.to_string().contains("triangle 1 names vertex 3"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn an_empty_scene_is_never_hit() {
+        let scene = Accelerator::build(device(), &[], &[]).expect("valid");
+        assert!(scene.intersect(Ray::new(Vec3::ZERO, DOWN)).is_none());
+        assert!(scene.bounds().is_none());
+    }
+}

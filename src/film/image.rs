@@ -1,0 +1,149 @@
+//! A finished image in memory.
+
+use super::Window;
+
+/// An image with its layers, as developed from a film or read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Width and height of the full image in pixels.
+    pub resolution: [u32; 2],
+    /// The part of the full image that there are pixels of.
+    pub window: Window,
+    /// Scene-linear Rec. 709, row by row from the top left of `window`.
+    pub color: Vec<[f32; 3]>,
+    /// What there is beside the colour.
+    pub layers: Vec<Layer>,
+    /// Names and values of a file's attributes, those of the container format
+    /// left out.
+    pub attributes: Vec<(String, String)>,
+}
+
+/// Further channels of an image, of equal size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// The layer's name, the part of a channel's name before the last dot.
+    pub name: String,
+    /// The channels' names, the part after the last dot.
+    pub channels: Vec<String>,
+    /// The values of each channel, row by row.
+    pub planes: Vec<Vec<f32>>,
+}
+
+impl Image {
+    /// A black image without layers.
+    pub fn black(resolution: [u32; 2], window: Window) -> Self {
+        Self {
+            resolution,
+            window,
+            color: vec![[0.0; 3]; window.area()],
+            layers: Vec::new(),
+            attributes: Vec::new(),
+        }
+    }
+
+    /// The layer of that name.
+    pub fn layer(&self, name: &str) -> Option<&Layer> {
+        self.layers.iter().find(|layer| layer.name == name)
+    }
+
+    /// The part of the image within `window`, which must lie in its own.
+    ///
+    /// # Panics
+    /// If it does not.
+    pub fn crop(&self, window: Window) -> Self {
+        assert_eq!(self.window.intersect(window), Some(window));
+        let indices = || window.pixels().map(|pixel| self.window.index(pixel));
+        let crop_layer = |layer: &Layer| Layer {
+            name: layer.name.clone(),
+            channels: layer.channels.clone(),
+            planes: layer
+                .planes
+                .iter()
+                .map(|plane| indices().map(|i| plane[i]).collect())
+                .collect(),
+        };
+        Self {
+            resolution: self.resolution,
+            window,
+            color: indices().map(|i| self.color[i]).collect(),
+            layers: self.layers.iter().map(crop_layer).collect(),
+            attributes: self.attributes.clone(),
+        }
+    }
+
+    /// The colour as 8-bit sRGB, row by row: scaled by 2^`exposure`, cut off at
+    /// white, encoded with the sRGB transfer function (IEC 61966-2-1). NaN
+    /// becomes black.
+    pub fn to_srgb8(&self, exposure: f32) -> Vec<u8> {
+        let scale = exposure.exp2();
+        // A cast turns NaN into 0.
+        let quantise = |c: f32| (srgb(c * scale) * 255.0 + 0.5) as u8;
+        let pixels = self.color.iter();
+        pixels.flat_map(|color| color.map(quantise)).collect()
+    }
+
+    /// The value of an attribute.
+    pub fn attribute(&self, name: &str) -> Option<&str> {
+        let found = self.attributes.iter().find(|(n, _)| n == name);
+        found.map(|(_, value)| value.as_str())
+    }
+}
+
+impl Layer {
+    /// A layer of zeros.
+    pub fn black(name: &str, channels: &[&str], pixels: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            channels: channels.iter().map(|&c| c.to_owned()).collect(),
+            planes: vec![vec![0.0; pixels]; channels.len()],
+        }
+    }
+
+    /// The values of one channel.
+    pub fn channel(&self, name: &str) -> Option<&[f32]> {
+        let index = self.channels.iter().position(|c| c == name)?;
+        Some(&self.planes[index])
+    }
+
+    /// Red, green and blue per pixel, if those channels are there.
+    pub fn rgb(&self) -> Option<Vec<[f32; 3]>> {
+        let [r, g, b] = ["R", "G", "B"].map(|name| self.channel(name));
+        let (r, g, b) = (r?, g?, b?);
+        Some((0..r.len()).map(|i| [r[i], g[i], b[i]]).collect())
+    }
+}
+
+/// The sRGB transfer function: linear in, encoded out, both in [0, 1].
+fn srgb(linear: f32) -> f32 {
+    let linear = linear.clamp(0.0, 1.0);
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values from the definition: mid grey 0.214041 is code 127.5 / 255; 0.18
+    /// is 0.461356.
+    #[test]
+    fn transfer_function_has_known_values() {
+        assert!((srgb(0.214_041) - 0.5).abs() < 1e-5);
+        assert!((srgb(0.18) - 0.461_356).abs() < 1e-5);
+        assert!((srgb(0.003_130_8) - 0.040_45).abs() < 1e-5);
+        assert!((srgb(1.0) - 1.0).abs() < 1e-6);
+        assert_eq!(srgb(7.0), srgb(1.0));
+        assert_eq!(srgb(-1.0), 0.0);
+    }
+
+    #[test]
+    fn exposure_counts_in_stops() {
+        let mut image = Image::black([1, 1], Window::full([1, 1]));
+        image.color[0] = [0.25, 0.5, f32::NAN];
+        assert_eq!(image.to_srgb8(1.0), [188, 255, 0]);
+        assert_eq!(image.to_srgb8(2.0), [255, 255, 0]);
+    }
+}

@@ -1,0 +1,344 @@
+//! One camera path: unidirectional path tracing with a light sample at every
+//! vertex, combined with BSDF sampling by the balance heuristic.
+
+use glam::Vec3;
+
+use crate::bsdf::{ByOrder, Layers};
+use crate::color::Rgb;
+use crate::embree::Ray;
+use crate::film::Sample;
+use crate::light::{EmitterId, LightSample};
+use crate::sampler::{Dimension, Purpose, Sampler};
+use crate::scene::{Features, Scene, Surface, has};
+
+/// Surfaces that a ray may pass straight through before it counts as stuck.
+const MAX_STRAIGHT: u32 = 256;
+
+/// Where shadow rays to points of the scene's own meshes end, as a share of the
+/// distance: short of the emitting triangle itself.
+const SHORT_OF_EMITTER: f32 = 1.0 - 1e-4;
+
+/// The least probability that Russian roulette lets a path go on with: bounds
+/// the factor on what survives.
+const MIN_SURVIVAL: f32 = 0.05;
+
+/// Light carried by one path, and what its first hit looked like.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PathResult {
+    /// Radiance, W·m⁻²·sr⁻¹.
+    pub radiance: ByOrder,
+    /// What the first surface is, if the camera ray met one.
+    pub first: Option<FirstHit>,
+    /// Rays traced, shadow rays among them.
+    pub rays: u32,
+}
+
+/// What AOVs say about the first surface.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHit {
+    /// See [`crate::scene::Material::albedo`].
+    pub albedo: Rgb,
+    /// Shading normal, world space, on the viewer's side.
+    pub normal: Vec3,
+    /// Distance along the camera ray, metres.
+    pub distance: f32,
+}
+
+impl PathResult {
+    /// As the film takes it; `depth_scale` turns the distance along the ray
+    /// into the depth along the view axis.
+    #[must_use]
+    pub fn to_sample(self, depth_scale: f32) -> Sample {
+        let first = self.first;
+        Sample {
+            color: self.radiance.total().to_array(),
+            albedo: first.map_or([0.0; 3], |f| f.albedo.to_array()),
+            normal: first.map_or([0.0; 3], |f| f.normal.to_array()),
+            depth: first.map(|f| f.distance * depth_scale),
+            single: self.radiance.single.to_array(),
+            multiple: self.radiance.multiple.to_array(),
+        }
+    }
+}
+
+/// The last vertex that light samples could have continued from.
+struct Vertex {
+    position: Vec3,
+    /// Density of the direction taken, sr⁻¹; `None` where no light sample
+    /// competes: at the camera and after single directions.
+    pdf: Option<f32>,
+    /// Distance from `position` to where the current ray starts: more than
+    /// zero after passing straight through surfaces.
+    travelled: f32,
+}
+
+/// Traces paths through `scene`, with code for the features `F` alone.
+pub struct PathTracer<'a, const F: u32> {
+    scene: &'a Scene,
+    /// Whether the first hit's AOVs are wanted.
+    describe_first: bool,
+}
+
+impl<'a, const F: u32> PathTracer<'a, F> {
+    /// A tracer for a scene whose features are all in `F`.
+    ///
+    /// # Panics
+    /// When they are not.
+    #[must_use]
+    pub fn new(scene: &'a Scene, describe_first: bool) -> Self {
+        assert!(
+            Features::from_bits(F).contains(scene.features),
+            "the kernel lacks a feature"
+        );
+        Self {
+            scene,
+            describe_first,
+        }
+    }
+
+    /// The light that arrives along `ray` at the camera.
+    pub fn trace(&self, mut ray: Ray, sampler: &mut Sampler) -> PathResult {
+        let mut result = PathResult::default();
+        let mut throughput = Rgb::ONE;
+        let mut multiple = false;
+        let mut last = Vertex {
+            position: ray.origin,
+            pdf: None,
+            travelled: 0.0,
+        };
+        // Surfaces met, which address random numbers, and those of them that scattered.
+        let mut vertex = 0;
+        let mut bounce = 0;
+        loop {
+            let camera = bounce == 0;
+            result.rays += 1;
+            let hit = self.scene.accelerator.intersect(ray);
+            let mut emitted = self.analytic_lights(&ray, hit.map(|h| h.t), &last, camera);
+            let Some(hit) = hit else {
+                emitted += self.world(&last, ray.direction);
+                deposit(&mut result.radiance, throughput * emitted, multiple);
+                break;
+            };
+            let surface = self.scene.surface::<F>(&ray, &hit);
+            if has::<F>(Features::HIDDEN_OBJECTS)
+                && camera
+                && vertex < MAX_STRAIGHT
+                && !self.scene.objects[surface.object].visible_to_camera
+            {
+                deposit(&mut result.radiance, throughput * emitted, multiple);
+                vertex += 1;
+                last.travelled += hit.t;
+                ray = surface.spawn(ray.direction);
+                continue;
+            }
+            if has::<F>(Features::EMISSIVE_MESHES) {
+                emitted += self.surface_emission(&surface, &last);
+            }
+            deposit(&mut result.radiance, throughput * emitted, multiple);
+            if self.describe_first && result.first.is_none() {
+                let material = &self.scene.materials[surface.material];
+                result.first = Some(FirstHit {
+                    albedo: material.albedo(&self.scene.textures, surface.uv),
+                    normal: surface.normal,
+                    distance: last.travelled + hit.t,
+                });
+            }
+            if bounce > self.scene.max_bounces {
+                break;
+            }
+
+            let layers = self.scene.layers(&surface);
+            let wo = -ray.direction;
+            if has::<F>(Features::LIGHT_SAMPLING) && layers.has_smooth() {
+                let direct = self.direct(&surface, &layers, wo, vertex, sampler, &mut result.rays);
+                if multiple {
+                    result.radiance.multiple += throughput * direct.total();
+                } else {
+                    result.radiance += direct * throughput;
+                }
+            }
+
+            let choice = if has::<F>(Features::MIXES) {
+                sampler.get_1d(Dimension::closure_choice(vertex))
+            } else {
+                0.0
+            };
+            let mut stream = sampler.walk_stream(vertex, Purpose::Sample);
+            let Some(sample) = layers.sample(wo, choice, &mut stream) else {
+                break;
+            };
+            vertex += 1;
+            throughput *= sample.weight;
+            ray = surface.spawn(sample.wi);
+            if has::<F>(Features::TRANSPARENCY) && sample.straight {
+                // Goes on as if nothing had been there.
+                if vertex > MAX_STRAIGHT {
+                    break;
+                }
+                last.travelled += hit.t;
+                continue;
+            }
+            multiple |= sample.order > 1;
+            let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
+                Some(layers.pdf(wo, sample.wi))
+            } else {
+                None
+            };
+            last = Vertex {
+                position: surface.position,
+                pdf,
+                travelled: 0.0,
+            };
+            bounce += 1;
+
+            if bounce >= self.scene.roulette_start {
+                let survival = throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
+                if sampler.get_1d(Dimension::roulette(vertex)) >= survival {
+                    break;
+                }
+                throughput /= survival;
+            }
+        }
+        result
+    }
+
+    /// What the lights without geometry add along a ray up to `t_far`.
+    fn analytic_lights(&self, ray: &Ray, t_far: Option<f32>, last: &Vertex, camera: bool) -> Rgb {
+        if !has::<F>(Features::AREA_LIGHTS) {
+            return Rgb::ZERO;
+        }
+        let mut sum = Rgb::ZERO;
+        let segment = Ray {
+            origin: last.position,
+            t_near: last.travelled,
+            t_far: t_far.map_or(f32::INFINITY, |t| last.travelled + t),
+            ..*ray
+        };
+        self.scene
+            .lights
+            .crossed(&segment, camera, |radiance, light_pdf| {
+                sum += radiance * last.weight(light_pdf);
+            });
+        sum
+    }
+
+    /// What a ray that leaves the scene brings.
+    fn world(&self, last: &Vertex, direction: Vec3) -> Rgb {
+        let (radiance, light_pdf) = self.scene.lights.world(last.position, direction);
+        if has::<F>(Features::LIGHT_SAMPLING) {
+            radiance * last.weight(light_pdf)
+        } else {
+            radiance
+        }
+    }
+
+    fn surface_emission(&self, surface: &Surface, last: &Vertex) -> Rgb {
+        let Some(first) = self.scene.objects[surface.object].first_emitter else {
+            return Rgb::ZERO;
+        };
+        let radiance = self.scene.emission(surface);
+        if radiance == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        let light_pdf = match last.pdf {
+            Some(_) => self.scene.lights.triangle_pdf(
+                last.position,
+                EmitterId(first + surface.triangle),
+                surface.position,
+                surface.geometric_normal,
+            ),
+            None => 0.0,
+        };
+        radiance * last.weight(light_pdf)
+    }
+
+    /// One light sample: f·|cosθ|·L/p with its multiple-importance weight.
+    fn direct(
+        &self,
+        surface: &Surface,
+        layers: &Layers,
+        wo: Vec3,
+        vertex: u32,
+        sampler: &mut Sampler,
+        rays: &mut u32,
+    ) -> ByOrder {
+        let choice = sampler.get_1d(Dimension::light_choice(vertex));
+        let position = sampler.get_2d(Dimension::light_position(vertex));
+        let Some(light) = self.scene.lights.sample(surface.position, choice, position) else {
+            return ByOrder::ZERO;
+        };
+        let pdf = layers.pdf(wo, light.direction);
+        if pdf <= 0.0 {
+            return ByOrder::ZERO;
+        }
+        let Some(radiance) = self.visible(surface, &light, rays) else {
+            return ByOrder::ZERO;
+        };
+        // The balance heuristic's weight over the density; a delta light has no rival.
+        let factor = if light.delta {
+            1.0 / light.pdf
+        } else {
+            1.0 / (light.pdf + pdf)
+        };
+        let mut stream = sampler.walk_stream(vertex, Purpose::Light);
+        let value = layers.eval(wo, light.direction, &mut stream);
+        value * (radiance * factor)
+    }
+
+    /// The radiance of the light sample that reaches the surface; `None` when it
+    /// is in shadow.
+    fn visible(&self, surface: &Surface, light: &LightSample, rays: &mut u32) -> Option<Rgb> {
+        let mut ray = surface.spawn(light.direction);
+        ray.t_far = light.distance;
+        let mut radiance = light.radiance;
+        if has::<F>(Features::EMISSIVE_MESHES) {
+            if let Some((EmitterId(emitter), barycentric)) = light.emitter {
+                ray.t_far *= SHORT_OF_EMITTER;
+                // Without textures the sample's own radiance is exact.
+                if has::<F>(Features::TEXTURES) {
+                    radiance = self.scene.emission_at(emitter, barycentric);
+                }
+            }
+        }
+        *rays += 1;
+        if !has::<F>(Features::TRANSPARENCY) {
+            return (!self.scene.accelerator.occluded(ray)).then_some(radiance);
+        }
+        for _ in 0..MAX_STRAIGHT {
+            let Some(hit) = self.scene.accelerator.intersect(ray) else {
+                return Some(radiance);
+            };
+            let blocker = self.scene.surface::<F>(&ray, &hit);
+            radiance *= self.scene.layers(&blocker).transparency();
+            if radiance.max_element() <= 0.0 {
+                return None;
+            }
+            let t_far = ray.t_far - hit.t;
+            ray = Ray {
+                t_far,
+                ..blocker.spawn(ray.direction)
+            };
+            *rays += 1;
+        }
+        None
+    }
+}
+
+impl Vertex {
+    /// The balance heuristic's weight of a direction found by BSDF sampling
+    /// that light sampling would have found with density `light_pdf` (sr⁻¹).
+    fn weight(&self, light_pdf: f32) -> f32 {
+        match self.pdf {
+            Some(pdf) => pdf / (pdf + light_pdf),
+            None => 1.0,
+        }
+    }
+}
+
+fn deposit(radiance: &mut ByOrder, light: Rgb, multiple: bool) {
+    if multiple {
+        radiance.multiple += light;
+    } else {
+        radiance.single += light;
+    }
+}

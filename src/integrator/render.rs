@@ -1,0 +1,235 @@
+//! Passes over the film, in parallel over its tiles, until a limit is reached.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::kernel::pass_for;
+use super::path::PathTracer;
+use crate::camera::Camera;
+use crate::film::{Aov, Film, FilmTile, PixelFilter};
+use crate::sampler::{Dimension, Sampler};
+use crate::scene::{Features, Scene, has};
+
+/// When to stop. Whatever is reached first counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Samples per pixel, those of a resumed film included.
+    pub spp: u32,
+    /// Wall-clock time.
+    pub time: Option<Duration>,
+    /// Estimated relative error of the image; see [`Film::relative_error`].
+    pub noise: Option<f64>,
+}
+
+/// Why rendering ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// All samples are taken.
+    Samples,
+    /// The time is up.
+    Time,
+    /// The image is clean enough.
+    Noise,
+    /// Somebody asked for it.
+    Interrupted,
+}
+
+/// How far it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Samples per pixel so far.
+    pub spp: u32,
+    /// How many there will be if nothing else stops it.
+    pub target: u32,
+    /// Time since the start.
+    pub elapsed: Duration,
+}
+
+/// What was done.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderReport {
+    /// Samples per pixel in the film.
+    pub spp: u32,
+    /// Samples per pixel that this call added.
+    pub added: u32,
+    /// Wall-clock time of this call.
+    pub wall: Duration,
+    /// Rays traced by this call.
+    pub rays: u64,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Estimated relative error at the end, from two samples per pixel on.
+    pub noise: Option<f64>,
+    /// The features of the kernel that ran.
+    pub kernel: Features,
+}
+
+/// The least samples per pixel before an error estimate is believed.
+const MIN_SPP_FOR_NOISE: u32 = 16;
+
+/// Between two looks at the clock, at most this share of the time limit.
+const TIME_SLICE: f64 = 0.05;
+
+/// One pass over the film.
+pub(super) struct Job<'a> {
+    request: &'a RenderRequest<'a>,
+    /// Samples `first .. first + count` of every pixel.
+    first: u32,
+    count: u32,
+    describe_first: bool,
+}
+
+/// What to render, and how far.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderRequest<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// From where.
+    pub camera: &'a Camera,
+    /// How samples spread within a pixel.
+    pub filter: &'a PixelFilter,
+    /// Another seed gives another, independent image.
+    pub seed: u64,
+    /// When to stop.
+    pub limits: Limits,
+    /// Use the kernel with every feature instead of the leanest that serves.
+    pub all_in: bool,
+    /// Becomes true when somebody wants it to end.
+    pub interrupt: &'a AtomicBool,
+}
+
+/// Renders into `film`, which may have samples already: they are counted and
+/// continued. The image depends on scene, seed and number of samples alone,
+/// not on threads or passes. When `interrupt` becomes true the current pass is
+/// finished first, so that all pixels have equally many samples.
+pub fn render(
+    request: &RenderRequest<'_>,
+    film: &mut Film,
+    mut progress: impl FnMut(Progress),
+) -> RenderReport {
+    let start = Instant::now();
+    let limits = request.limits;
+    let (kernel, pass) = pass_for(request.scene, request.all_in);
+    let aovs = film.aovs();
+    let describe_first = [Aov::Albedo, Aov::Normal, Aov::Depth]
+        .into_iter()
+        .any(|aov| aovs.contains(aov));
+    let begun = film.samples_per_pixel();
+    let mut spp = begun;
+    let mut rays = 0;
+    let mut noise = None;
+    let mut stop = Stop::Samples;
+    let mut slowest_sample = Duration::ZERO;
+    while spp < limits.spp {
+        let elapsed = start.elapsed();
+        progress(Progress {
+            spp,
+            target: limits.spp,
+            elapsed,
+        });
+        if request.interrupt.load(Ordering::Relaxed) {
+            stop = Stop::Interrupted;
+            break;
+        }
+        if limits
+            .time
+            .is_some_and(|t| spp > begun && elapsed + slowest_sample > t)
+        {
+            stop = Stop::Time;
+            break;
+        }
+        let count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
+        let job = Job {
+            request,
+            first: spp,
+            count,
+            describe_first,
+        };
+        let pass_start = Instant::now();
+        rays += pass(&job, film.tiles_mut());
+        spp += count;
+        slowest_sample = slowest_sample.max(pass_start.elapsed() / count);
+        if let Some(target) = limits.noise {
+            noise = film.relative_error();
+            if spp >= MIN_SPP_FOR_NOISE && noise.is_some_and(|n| n <= target) {
+                stop = Stop::Noise;
+                break;
+            }
+        }
+    }
+    progress(Progress {
+        spp,
+        target: limits.spp,
+        elapsed: start.elapsed(),
+    });
+    RenderReport {
+        spp,
+        added: spp - begun,
+        wall: start.elapsed(),
+        rays,
+        stop,
+        noise: noise.or_else(|| film.relative_error()),
+        kernel,
+    }
+}
+
+/// Samples per pixel of the next pass: doubling from one, so that early
+/// interrupts are quick and late passes are long enough to keep threads busy.
+fn pass_length(done: u32, left: u32, time: Option<Duration>, sample: Duration) -> u32 {
+    let doubling = done.clamp(1, 64).min(left);
+    match time {
+        Some(time) if !sample.is_zero() => {
+            let slice = (time.as_secs_f64() * TIME_SLICE / sample.as_secs_f64()) as u32;
+            doubling.min(slice.max(1))
+        }
+        _ => doubling,
+    }
+}
+
+/// Adds the job's samples to every tile; returns the rays traced.
+pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -> u64 {
+    let tracer = PathTracer::<F>::new(job.request.scene, job.describe_first);
+    tiles
+        .par_iter_mut()
+        .map(|tile| {
+            let mut rays = 0;
+            for pixel in tile.window().pixels() {
+                for sample in job.first..job.first + job.count {
+                    rays += u64::from(render_sample(&tracer, job, pixel, sample, tile));
+                }
+            }
+            rays
+        })
+        .sum()
+}
+
+fn render_sample<const F: u32>(
+    tracer: &PathTracer<'_, F>,
+    job: &Job<'_>,
+    pixel: [u32; 2],
+    index: u32,
+    tile: &mut FilmTile,
+) -> u32 {
+    let RenderRequest {
+        camera,
+        filter,
+        seed,
+        ..
+    } = *job.request;
+    let mut sampler = Sampler::new(seed, pixel, index);
+    let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
+    let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
+    let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
+        sampler.get_2d(Dimension::lens())
+    } else {
+        [0.5; 2]
+    };
+    let ray = camera.ray(raster, lens);
+    // Depth counts along the view axis, not along the ray.
+    let depth_scale = ray.direction.dot(camera.forward());
+    let result = tracer.trace(ray, &mut sampler);
+    tile.add(pixel, &result.to_sample(depth_scale));
+    result.rays
+}

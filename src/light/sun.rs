@@ -1,0 +1,98 @@
+//! Light from infinitely far.
+
+use super::warp::Cone;
+use super::{LightSample, Rgb};
+use crate::color::luminance;
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// A sun: parallel light, or a disk in the sky.
+#[derive(Clone, Copy, Debug)]
+pub struct SunLight {
+    towards: Vec3,
+    face: Face,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Face {
+    /// Irradiance of a plane facing the sun, W·m⁻².
+    Point(Rgb),
+    /// Radiance, W·m⁻²·sr⁻¹.
+    Disk { radiance: Rgb, one_minus_cos: f32 },
+}
+
+impl SunLight {
+    /// Parallel light of `irradiance` W·m⁻² on a plane that faces the sun;
+    /// the unit vector `towards` points at the sun.
+    #[must_use]
+    pub fn parallel(towards: Vec3, irradiance: Rgb) -> Self {
+        Self {
+            towards,
+            face: Face::Point(irradiance),
+        }
+    }
+
+    /// A disk of `half_angle` radians (at most π/2) and constant `radiance` in
+    /// W·m⁻²·sr⁻¹; the unit vector `towards` points at its centre.
+    #[must_use]
+    pub fn disk(towards: Vec3, half_angle: f32, radiance: Rgb) -> Self {
+        let sin_of_half = (half_angle.clamp(0.0, FRAC_PI_2) / 2.0).sin();
+        Self {
+            towards,
+            face: Face::Disk {
+                radiance,
+                one_minus_cos: 2.0 * sin_of_half * sin_of_half,
+            },
+        }
+    }
+
+    /// The luminance of the irradiance of a plane that faces the sun, W·m⁻².
+    pub(super) fn irradiance(&self) -> f32 {
+        match self.face {
+            Face::Point(irradiance) => luminance(irradiance),
+            Face::Disk {
+                radiance,
+                one_minus_cos,
+            } => luminance(radiance) * PI * one_minus_cos * (2.0 - one_minus_cos),
+        }
+    }
+
+    /// Samples a direction to the sun; `selection` is the probability with
+    /// which this light was chosen.
+    pub(super) fn sample(&self, selection: f32, u: [f32; 2]) -> LightSample {
+        let (direction, radiance, pdf, delta) = match self.face {
+            Face::Point(irradiance) => (self.towards, irradiance, selection, true),
+            Face::Disk {
+                radiance,
+                one_minus_cos,
+            } => {
+                let cone = Cone::new(self.towards, one_minus_cos);
+                (cone.sample(u).0, radiance, selection * cone.pdf(), false)
+            }
+        };
+        LightSample {
+            direction,
+            distance: f32::INFINITY,
+            radiance,
+            pdf,
+            delta,
+            emitter: None,
+        }
+    }
+
+    /// The radiance from a direction and the density with which
+    /// [`SunLight::sample`] would have found it, sr⁻¹, without the probability
+    /// of choosing this light.
+    pub(super) fn seen(&self, direction: Vec3) -> Option<(Rgb, f32)> {
+        match self.face {
+            Face::Point(_) => None,
+            Face::Disk {
+                radiance,
+                one_minus_cos,
+            } => {
+                let cone = Cone::new(self.towards, one_minus_cos);
+                cone.contains(direction).then(|| (radiance, cone.pdf()))
+            }
+        }
+    }
+}

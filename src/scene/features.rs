@@ -1,0 +1,127 @@
+//! What a scene uses, so that the rest can be left out.
+
+/// A set of features. The integrator is compiled for a few such sets (see
+/// [`crate::integrator`]); code for a feature outside of the set is not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Features(u32);
+
+/// Declares the features with their bit, their name and what each costs.
+macro_rules! features {
+    ($($(#[$doc:meta])* $constant:ident = $bit:literal, $name:literal, $cost:literal;)*) => {
+        impl Features {
+            $($(#[$doc])* pub const $constant: Self = Self(1 << $bit);)*
+
+            /// Every feature with its name and what it costs a scene that has it.
+            pub const ALL: &[(Self, &str, &str)] = &[$((Self::$constant, $name, $cost),)*];
+        }
+    };
+}
+
+features! {
+    /// Image textures on materials.
+    TEXTURES = 0, "textures", "UVs in memory, a look-up per textured value and hit";
+    /// A world image, sampled by importance.
+    ENVIRONMENT = 1, "environment map", "the image and a sampling table of its size, a look-up per ray that leaves";
+    /// Anything that light samples can connect to.
+    LIGHT_SAMPLING = 2, "light sampling", "a shadow ray, a BSDF value and a proxy density per hit";
+    /// Light shapes that rays can meet: areas, spheres, suns with a disk.
+    AREA_LIGHTS = 3, "area lights", "an intersection per light and ray";
+    /// Meshes with emission.
+    EMISSIVE_MESHES = 4, "emissive meshes", "a table of their triangles";
+    /// Dielectric closures.
+    TRANSMISSION = 5, "transmission", "dielectric closures in the kernel";
+    /// Microsurface walks of more than one facet.
+    MULTIPLE_SCATTERING = 6, "multiple scattering", "random walks in sampling and evaluation";
+    /// Roughness that differs by direction.
+    ANISOTROPY = 7, "anisotropy", "a tangent per hit";
+    /// Materials of more than one closure.
+    MIXES = 8, "mixes", "up to eight closures per hit";
+    /// Surfaces that let light straight through.
+    TRANSPARENCY = 9, "transparent shadows", "shadow rays that step through surfaces";
+    /// A camera with an aperture.
+    DEPTH_OF_FIELD = 10, "depth of field", "a lens sample per camera ray";
+    /// Meshes that several objects share.
+    INSTANCES = 11, "instances", "a second level in the hierarchy, a transform per hit";
+    /// Interpolated normals.
+    SMOOTH_NORMALS = 12, "smooth normals", "normals in memory, an interpolation per hit";
+    /// Objects that camera rays pass.
+    HIDDEN_OBJECTS = 13, "objects hidden from the camera", "a test per camera ray";
+}
+
+impl Features {
+    /// None.
+    pub const NONE: Self = Self(0);
+
+    /// The set with exactly these bits.
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// The bits, for use as a const parameter.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// Both sets together.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// This set without the other.
+    #[must_use]
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Whether all of `other` is in this set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Adds `other` where `condition` holds.
+    pub fn add_if(&mut self, other: Self, condition: bool) {
+        if condition {
+            self.0 |= other.0;
+        }
+    }
+
+    /// How many features are in the set.
+    #[must_use]
+    pub const fn len(self) -> u32 {
+        self.0.count_ones()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// Whether the feature set `F` of a monomorphised function has `feature`.
+#[must_use]
+#[inline(always)]
+pub const fn has<const F: u32>(feature: Features) -> bool {
+    Features::from_bits(F).contains(feature)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_feature_has_a_bit_of_its_own() {
+        let all = Features::ALL
+            .iter()
+            .fold(Features::NONE, |set, (f, ..)| set.with(*f));
+        assert_eq!(all.len() as usize, Features::ALL.len());
+        assert!(
+            all.contains(Features::MIXES)
+                && !all.without(Features::MIXES).contains(Features::MIXES)
+        );
+    }
+}

@@ -1,0 +1,496 @@
+//! Description and files to runtime scene: names, defaults and units end here.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
+
+use super::load::Assets;
+use super::materials::{Names, compile_material};
+use super::transform::to_affine;
+use super::{Features, Leaf, Material, Number, Object, Roughness, Scene, SceneMesh, Tangent};
+use crate::bsdf::Method;
+use crate::camera::Camera;
+use crate::color::Rgb;
+use crate::description::{Assignment, Description};
+use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
+use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
+use crate::mesh::Mesh;
+use crate::scene::material::{Facet, Tint};
+use crate::texture::Texture;
+
+/// Everything that keeps a scene from being rendered, a line or more each.
+#[derive(Debug, PartialEq, Eq)]
+pub struct ResolveError {
+    /// For people.
+    pub problems: Vec<String>,
+}
+
+impl std::fmt::Display for ResolveError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.problems.join("\n"))
+    }
+}
+
+impl std::error::Error for ResolveError {}
+
+/// A scene, and what was mended to get it.
+#[derive(Debug)]
+pub struct Resolved {
+    /// Ready to render.
+    pub scene: Scene,
+    /// Repairs of input files and things that were left out, for people.
+    pub repairs: Vec<String>,
+}
+
+/// Reads the files that the description names and builds the scene.
+///
+/// # Errors
+/// Every file that can't be read and every name that leads nowhere.
+pub fn resolve(description: &Description) -> Result<Resolved, ResolveError> {
+    assemble(description, Assets::load(description)?)
+}
+
+/// Builds the scene from a description and the contents of its files.
+///
+/// # Errors
+/// Every name that leads nowhere, and what Embree refuses.
+pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, ResolveError> {
+    let mut problems = Vec::new();
+    let Assets {
+        meshes,
+        textures,
+        environment,
+        repairs,
+    } = assets;
+
+    let texture_index: BTreeMap<String, usize> = textures.keys().cloned().zip(0..).collect();
+    let textures: Vec<Texture> = textures.into_values().collect();
+    let mut materials = MaterialTable::new(description, &texture_index);
+    let mut placing = Placing::new(description, meshes);
+    let mut objects = Vec::new();
+    let mut geometries = Vec::new();
+    for (index, object) in description.objects.iter().enumerate() {
+        let name = object
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("objects.{index}"));
+        let result = placing.place(object, &name, &mut materials);
+        match result {
+            Ok((object, geometry)) => {
+                objects.push(object);
+                geometries.push(geometry);
+            }
+            Err(message) => problems.push(message),
+        }
+    }
+    problems.append(&mut materials.problems);
+    let materials = materials.compiled;
+    let Placing {
+        scene_meshes,
+        shared,
+        ..
+    } = placing;
+
+    for object in &mut objects {
+        if object
+            .materials
+            .iter()
+            .any(|&m| has_radial_tangent(&materials[m]))
+        {
+            object.world_to_box = Some(box_of(object, &scene_meshes[object.mesh]));
+        }
+    }
+
+    let mut lamps: Vec<Light> = Vec::new();
+    for (index, light) in description.lights.iter().enumerate() {
+        match resolve_light(light, to_affine(&light.transform), description.light_units) {
+            Ok(light) => lamps.push(light),
+            Err(error) => problems.push(format!("lights.{index}: {error}")),
+        }
+    }
+    // The image was read with the other files; a world without one has none.
+    let world = match &description.world {
+        None => World::Constant(Rgb::ZERO),
+        Some(world) => resolve_world(world, |_| environment.ok_or("the world's image is missing"))
+            .unwrap_or_else(|error| {
+                problems.push(format!("world: {error}"));
+                World::Constant(Rgb::ZERO)
+            }),
+    };
+    let triangles = emissive_triangles(&mut objects, &scene_meshes, &materials, &textures);
+    let camera = description.camera.as_ref().map(|camera| {
+        let resolution = [description.film.width, description.film.height];
+        Camera::from_description(camera, to_affine(&camera.transform), resolution)
+    });
+    let camera = match camera.transpose() {
+        Ok(camera) => camera,
+        Err(error) => {
+            problems.push(format!("camera: {error}"));
+            None
+        }
+    };
+
+    if !problems.is_empty() {
+        return Err(ResolveError { problems });
+    }
+    let build = || -> Result<Accelerator, crate::embree::EmbreeError> {
+        Accelerator::build(Arc::new(Device::new(0)?), &shared, &geometries)
+    };
+    let accelerator = build().map_err(|e| ResolveError {
+        problems: vec![e.to_string()],
+    })?;
+    let lights = Lights::new(lamps, world, triangles);
+    let mut scene = Scene {
+        accelerator,
+        meshes: scene_meshes,
+        objects,
+        materials,
+        textures,
+        lights,
+        camera,
+        features: Features::NONE,
+        max_bounces: description.sampling.max_bounces,
+        roulette_start: description.sampling.roulette_start,
+    };
+    scene.features = features(&scene);
+    Ok(Resolved { scene, repairs })
+}
+
+/// Compiles materials when an object first uses them.
+struct MaterialTable<'a> {
+    names: Names<'a>,
+    indices: BTreeMap<String, usize>,
+    compiled: Vec<Material>,
+    problems: Vec<String>,
+}
+
+impl<'a> MaterialTable<'a> {
+    fn new(description: &'a Description, textures: &'a BTreeMap<String, usize>) -> Self {
+        Self {
+            names: Names {
+                materials: &description.materials,
+                textures,
+                estimator: description.sampling.estimator,
+            },
+            indices: BTreeMap::new(),
+            compiled: Vec::new(),
+            problems: Vec::new(),
+        }
+    }
+
+    /// The index of the material of this name; `None` if there is no such name.
+    fn index(&mut self, name: &str) -> Option<usize> {
+        if let Some(&index) = self.indices.get(name) {
+            return Some(index);
+        }
+        let material = self.names.materials.get(name)?;
+        let compiled = compile_material(material, &self.names).unwrap_or_else(|error| {
+            self.problems.push(format!("materials.{name}: {error}"));
+            Material::default()
+        });
+        self.compiled.push(compiled);
+        self.indices
+            .insert(name.to_owned(), self.compiled.len() - 1);
+        Some(self.compiled.len() - 1)
+    }
+}
+
+/// Puts meshes where objects are: into world space when one object alone uses
+/// the mesh, else once in their own space, to be instanced.
+struct Placing {
+    meshes: BTreeMap<String, Mesh>,
+    users: BTreeMap<String, usize>,
+    scene_meshes: Vec<SceneMesh>,
+    /// For instanced meshes: index into `scene_meshes` and into `shared`, and
+    /// the names of the material slots.
+    placed: BTreeMap<String, (usize, usize, Vec<String>)>,
+    shared: Vec<SharedMesh>,
+}
+
+impl Placing {
+    fn new(description: &Description, meshes: BTreeMap<String, Mesh>) -> Self {
+        let mut users = BTreeMap::new();
+        for object in &description.objects {
+            *users.entry(object.mesh.clone()).or_default() += 1;
+        }
+        Self {
+            meshes,
+            users,
+            scene_meshes: Vec::new(),
+            placed: BTreeMap::new(),
+            shared: Vec::new(),
+        }
+    }
+
+    fn place(
+        &mut self,
+        object: &crate::description::Object,
+        name: &str,
+        materials: &mut MaterialTable<'_>,
+    ) -> Result<(Object, Geometry), String> {
+        let to_world = to_affine(&object.transform);
+        let linear = Mat3::from(to_world.matrix3);
+        let determinant = linear.as_dmat3().determinant();
+        if !to_world.is_finite() || determinant == 0.0 {
+            return Err(format!("{name}: the transform flattens the object"));
+        }
+        let normal_to_world = Mat3A::from(linear.as_dmat3().inverse().transpose().as_mat3());
+        let alone = self.users.get(&object.mesh) == Some(&1);
+        if let std::collections::btree_map::Entry::Vacant(entry) =
+            self.placed.entry(object.mesh.clone())
+        {
+            let mesh = self
+                .meshes
+                .remove(&object.mesh)
+                .ok_or_else(|| format!("{name}: there is no mesh `{}`", object.mesh))?;
+            let slots = mesh.material_names.clone();
+            let scene_mesh = scene_mesh(mesh, alone.then_some((&to_world, &normal_to_world)));
+            if !alone {
+                self.shared.push((
+                    Arc::clone(&scene_mesh.vertices),
+                    Arc::clone(&scene_mesh.triangles),
+                ));
+            }
+            self.scene_meshes.push(scene_mesh);
+            entry.insert((
+                self.scene_meshes.len() - 1,
+                self.shared.len().wrapping_sub(1),
+                slots,
+            ));
+        }
+        let (mesh, shared, slots) = self.placed[&object.mesh].clone();
+        let material_indices = assign(&object.materials, &slots, name, materials)?;
+        let geometry = if alone {
+            Geometry::Mesh {
+                vertices: Arc::clone(&self.scene_meshes[mesh].vertices),
+                triangles: Arc::clone(&self.scene_meshes[mesh].triangles),
+            }
+        } else {
+            Geometry::Instance { shared, to_world }
+        };
+        let runtime = Object {
+            name: name.to_owned(),
+            mesh,
+            to_world: (!alone).then_some(to_world),
+            normal_to_world,
+            world_to_box: None,
+            mirrored: determinant < 0.0,
+            materials: material_indices,
+            visible_to_camera: object.visible_to_camera,
+            first_emitter: None,
+        };
+        Ok((runtime, geometry))
+    }
+}
+
+/// The material of each slot of a mesh.
+fn assign(
+    assignment: &Assignment,
+    slots: &[String],
+    object: &str,
+    materials: &mut MaterialTable<'_>,
+) -> Result<Vec<usize>, String> {
+    let mut find = |name: &str, why: &str| {
+        materials.index(name).ok_or_else(|| {
+            let known: Vec<&str> = materials
+                .names
+                .materials
+                .keys()
+                .map(String::as_str)
+                .collect();
+            format!(
+                "{object}: there is no material `{name}`{why}; there are: {}",
+                known.join(", ")
+            )
+        })
+    };
+    match assignment {
+        Assignment::All(name) => Ok(vec![find(name, "")?; slots.len().max(1)]),
+        Assignment::BySlot(map) if slots.is_empty() => match map.values().next() {
+            Some(name) if map.len() == 1 => Ok(vec![find(name, "")?]),
+            _ => Err(format!(
+                "{object}: `materials` names slots, but the mesh has no usemtl line"
+            )),
+        },
+        Assignment::BySlot(map) => slots
+            .iter()
+            .map(|slot| match map.get(slot) {
+                Some(name) => find(name, ""),
+                None => Err(format!(
+                    "{object}: `materials` has nothing for the slot `{slot}`"
+                )),
+            })
+            .collect(),
+        Assignment::FromMesh if slots.is_empty() => Err(format!(
+            "{object}: has neither `material` nor `materials`, and the mesh has no usemtl line"
+        )),
+        Assignment::FromMesh => slots
+            .iter()
+            .map(|slot| find(slot, ", which the mesh's usemtl line asks for"))
+            .collect(),
+    }
+}
+
+/// The mesh as the scene keeps it, moved to world space if one object has it
+/// for itself.
+fn scene_mesh(mesh: Mesh, place: Option<(&Affine3A, &Mat3A)>) -> SceneMesh {
+    let mut positions = mesh.positions;
+    let mut normals = mesh.normals;
+    if let Some((to_world, normal_to_world)) = place {
+        for p in &mut positions {
+            *p = to_world.transform_point3a(Vec3A::from(*p)).into();
+        }
+        for n in normals.iter_mut().flatten() {
+            *n = (*normal_to_world * Vec3A::from(*n))
+                .normalize_or_zero()
+                .into();
+        }
+    }
+    SceneMesh {
+        vertices: Arc::new(positions.into()),
+        triangles: Arc::new(mesh.triangles),
+        normals,
+        uvs: mesh.uvs,
+        slots: mesh.material_of_triangle,
+    }
+}
+
+/// World space to the box round the object's mesh, each side from −½ to ½.
+fn box_of(object: &Object, mesh: &SceneMesh) -> Affine3A {
+    // A mesh in world space has lost its own axes; its transform is undone
+    // through the matrix for normals, the inverse transpose of its linear part.
+    let to_local = match object.to_world {
+        Some(to_world) => to_world.inverse(),
+        None => Affine3A::from_mat3(Mat3::from(object.normal_to_world.transpose())),
+    };
+    let in_object = |p: &[f32; 3]| match object.to_world {
+        Some(_) => Vec3A::from(*p),
+        None => to_local.transform_point3a(Vec3A::from(*p)),
+    };
+    let (low, high) = mesh
+        .vertices
+        .iter()
+        .map(in_object)
+        .fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), p| {
+            (low.min(p), high.max(p))
+        });
+    // A flat side has no extent to divide by, and no tangent that needs it.
+    let size = (high - low).max(Vec3A::splat(f32::MIN_POSITIVE));
+    let to_box = Affine3A::from_scale(Vec3::from(size.recip().min(Vec3A::splat(f32::MAX))))
+        * Affine3A::from_translation(Vec3::from(-(low + high) * 0.5));
+    to_box * to_local
+}
+
+fn has_radial_tangent(material: &Material) -> bool {
+    material.leaves.iter().any(|weighted| {
+        matches!(&weighted.leaf, Leaf::Rough(rough) if matches!(rough.tangent, Tangent::Radial(_)))
+    })
+}
+
+/// Lists the triangles of emissive objects for the light sampler, and numbers
+/// the objects' first ones.
+fn emissive_triangles(
+    objects: &mut [Object],
+    meshes: &[SceneMesh],
+    materials: &[Material],
+    textures: &[Texture],
+) -> Vec<EmissiveTriangle> {
+    let mut emissive = Vec::new();
+    for object in objects {
+        if !object.materials.iter().any(|&m| materials[m].emits()) {
+            continue;
+        }
+        object.first_emitter = u32::try_from(emissive.len()).ok();
+        let mesh = &meshes[object.mesh];
+        for (index, corners) in mesh.triangles.iter().enumerate() {
+            let slot = mesh.slots.as_ref().map_or(0, |slots| slots[index] as usize);
+            let vertices = corners.map(|i| {
+                let p = Vec3A::from(mesh.vertices[i as usize]);
+                Vec3::from(
+                    object
+                        .to_world
+                        .map_or(p, |to_world| to_world.transform_point3a(p)),
+                )
+            });
+            let radiance = mean_emission(&materials[object.materials[slot]], textures);
+            emissive.push(EmissiveTriangle { vertices, radiance });
+        }
+    }
+    emissive
+}
+
+/// What a material shines on average, W·m⁻²·sr⁻¹: textures by their mean.
+fn mean_emission(material: &Material, textures: &[Texture]) -> Rgb {
+    let mut sum = Rgb::ZERO;
+    for weighted in &material.leaves {
+        if let Leaf::Emission(tint, strength) = weighted.leaf {
+            let color = match tint {
+                Tint::Constant(color) => color,
+                Tint::Texture(index) => Rgb::from(textures[index].mean()),
+            };
+            // Textured mix factors count as one half.
+            let factors = 0.5f32.powi(weighted.factors.len() as i32);
+            sum += color * (strength * weighted.share * factors);
+        }
+    }
+    sum
+}
+
+/// What the scene uses, and so which kernel can render it.
+fn features(scene: &Scene) -> Features {
+    let mut set = Features::NONE;
+    set.add_if(Features::LIGHT_SAMPLING, !scene.lights.is_empty());
+    set.add_if(Features::AREA_LIGHTS, !scene.lights.lamps().is_empty());
+    set.add_if(
+        Features::ENVIRONMENT,
+        matches!(scene.lights.surroundings(), World::Environment(_)),
+    );
+    set.add_if(
+        Features::EMISSIVE_MESHES,
+        scene.objects.iter().any(|o| o.first_emitter.is_some()),
+    );
+    set.add_if(
+        Features::INSTANCES,
+        scene.objects.iter().any(|o| o.to_world.is_some()),
+    );
+    set.add_if(
+        Features::HIDDEN_OBJECTS,
+        scene.objects.iter().any(|o| !o.visible_to_camera),
+    );
+    set.add_if(
+        Features::SMOOTH_NORMALS,
+        scene.meshes.iter().any(|m| m.normals.is_some()),
+    );
+    set.add_if(
+        Features::DEPTH_OF_FIELD,
+        scene.camera.as_ref().is_some_and(Camera::has_lens),
+    );
+    set.add_if(Features::TEXTURES, !scene.textures.is_empty());
+    for material in &scene.materials {
+        set.add_if(Features::MIXES, material.leaves.len() > 1);
+        for weighted in &material.leaves {
+            match &weighted.leaf {
+                Leaf::Lambert(_) | Leaf::Emission(..) => {}
+                Leaf::Transparent(_) => set.add_if(Features::TRANSPARENCY, true),
+                Leaf::Rough(rough) => {
+                    let smooth = matches!(
+                        rough.roughness,
+                        Roughness::Alpha(Number::Constant(x), Number::Constant(y)) if x == 0.0 && y == 0.0
+                    ) || matches!(
+                        rough.roughness,
+                        Roughness::Blender { roughness: Number::Constant(r), .. } if r == 0.0
+                    );
+                    let multiple = matches!(rough.method, Method::Multiple(_)) && !smooth;
+                    set.add_if(Features::MULTIPLE_SCATTERING, multiple);
+                    set.add_if(Features::ANISOTROPY, rough.tangent != Tangent::Any);
+                    set.add_if(
+                        Features::TRANSMISSION,
+                        matches!(rough.facet, Facet::Glass(..)),
+                    );
+                }
+            }
+        }
+    }
+    set
+}

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Sets up, then checks everything: format, lints, documentation, tests, scripts.
+# A failing stage does not stop the others; the end names every one.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")" || exit
+PATH=$PATH:${HOME:-/root}/.cargo/bin
+
+failed=() times=()
+stage() {
+    local name=$1 begin=$SECONDS outcome=ok
+    shift
+    printf '\n== %s\n' "$name"
+    "$@" || { outcome=FAILED && failed+=("$name"); }
+    times+=("$(printf '%5d s  %-13s %s' $((SECONDS - begin)) "$name" $outcome)")
+}
+
+results=$(mktemp)
+trap 'rm -f "$results"' EXIT
+documentation() { RUSTDOCFLAGS='-D warnings' cargo doc --no-deps; }
+tests() { cargo test --no-fail-fast 2>&1 | tee "$results"; }
+scripts() { find . \( -path ./target -o -path ./.deps -o -path ./.git \) -prune -o "$@" -print0; }
+shell_syntax() { scripts -name '*.sh' | xargs -0 -n 1 bash -n && bash -n .ci/run; }
+python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
+
+stage set-up ./setup.sh --with-lints --with-blender
+[[ ${#failed[@]} -eq 0 ]] || exit 1
+stage shell shell_syntax
+stage python python_syntax
+stage format cargo fmt --check
+stage clippy cargo clippy --locked --all-targets -- -D warnings
+stage documentation documentation
+stage tests tests
+
+printf '\n== summary\n'
+grep '^test result:' "$results"
+printf '%s\n' "${times[@]}" "$(printf '%5d s  in all' $SECONDS)"
+awk '/^test result:/ { passed += $4; failed += $6; skipped += $8 }
+     END { printf "%d passed, %d failed, %d skipped\n", passed, failed, skipped }' "$results"
+if [[ ${#failed[@]} -gt 0 ]]; then
+    printf 'failed: %s\n' "${failed[*]}" >&2
+    exit 1
+fi

@@ -1,0 +1,559 @@
+//! What people are told about scenes, meshes and images that can't be used.
+
+use smithwalk::description::{Description, Material};
+use smithwalk::mesh::{Mesh, Wanted};
+use smithwalk::texture::{ColorSpace, Interpolation, Texture, load_environment};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// A directory that is empty at the start.
+fn directory(name: &str) -> PathBuf {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).unwrap();
+    path
+}
+
+/// What is said about each scene, one after the other.
+fn scenes(cases: &[(&str, &str)]) -> String {
+    let mut said = String::new();
+    for (what, text) in cases {
+        let text = format!("smithwalk: 1\n{text}");
+        let answer = match Description::from_str(&text, "scene.yaml", &[]) {
+            Ok(_) => panic!("{what}: expected problems, found none"),
+            Err(problems) => problems.to_string(),
+        };
+        writeln!(said, "# {what}\n{answer}\n").unwrap();
+    }
+    said
+}
+
+#[test]
+fn files_that_are_no_scenes() {
+    let deep = "[".repeat(100) + &"]".repeat(100);
+    let bomb = (1..9).fold(
+        "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned(),
+        |text, i| {
+            let alias = format!("*a{}, ", i - 1).repeat(10);
+            format!("{text}a{i}: &a{i} [{alias}]\n")
+        },
+    );
+    let mut said = String::new();
+    for (what, text) in [
+        ("empty", ""),
+        ("a comment alone", "# nothing here\n"),
+        ("not a mapping", "- 1\n- 2\n"),
+        ("a broken list", "smithwalk: 1\nfilm: {width: [1, 2\n"),
+        ("a tab as indent", "smithwalk: 1\nfilm:\n\twidth: 3\n"),
+        ("two documents", "smithwalk: 1\n---\nsmithwalk: 1\n"),
+        ("a tag", "smithwalk: !!int 1\n"),
+        ("no version", "film: {width: 8}\n"),
+        ("a newer version", "smithwalk: 2\n"),
+        ("too deep", &deep),
+        ("too many aliases", &bomb),
+        ("an alias inside itself", "a: &a [*a]\n"),
+        ("an unknown alias", "a: *b\n"),
+        ("a list as key", "smithwalk: 1\n[1, 2]: 3\n"),
+    ] {
+        let answer = match Description::from_str(text, "scene.yaml", &[]) {
+            Ok(_) => panic!("{what}: expected problems, found none"),
+            Err(problems) => problems.to_string(),
+        };
+        let short: Vec<String> = answer
+            .lines()
+            .map(|line| line.chars().take(120).collect())
+            .collect();
+        writeln!(said, "# {what}\n{}\n", short.join("\n")).unwrap();
+    }
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn keys_and_types() {
+    insta::assert_snapshot!(scenes(&[
+        ("a misspelt section", "lihgts: []"),
+        ("a misspelt key", "film: {hieght: 3}"),
+        (
+            "a key of a parent",
+            "camera: {projection: {perspective: {}}, fov: 40}"
+        ),
+        ("a key twice", "film:\n  width: 8\n  height: 8\n  width: 9"),
+        ("text for a number", "film: {exposure: bright}"),
+        ("a negative count", "film: {width: -8}"),
+        ("a fraction for a count", "sampling: {spp: 1.5}"),
+        (
+            "too short a list",
+            "objects: [{mesh: a, transform: {location: [1, 2]}}]\nmeshes: {a: {file: a.obj}}"
+        ),
+        (
+            "too long a list",
+            "objects: [{mesh: a, transform: {location: [1, 2, 3, 4]}}]\nmeshes: {a: {file: a.obj}}"
+        ),
+        ("NaN", "film: {exposure: .nan}"),
+        ("infinity", "lights: [point: {power: .inf}]"),
+        (
+            "a number beyond single precision",
+            "lights: [point: {power: 1e40}]"
+        ),
+        ("an unknown kind", "materials:\n  gold: {conducter: {}}"),
+        ("a kind without keys", "film: {filter: box}"),
+        (
+            "two kinds",
+            "world: {constant: {}, environment: {file: a.exr}}"
+        ),
+        ("a kind that is missing", "lights: [{}]"),
+        ("an unknown choice", "sampling: {estimator: two_walk}"),
+        ("a missing key", "lights:\n  - area: {power: 3}"),
+        (
+            "an inline material with two kinds",
+            "materials: {m: {mix: {a: {diffuse: {}, emission: {}}, b: {diffuse: {}}}}}"
+        ),
+        (
+            "a texture for what takes none",
+            "textures: {t: {file: t.png}}\nmaterials: {m: {dielectric: {ior: {texture: t}}}}"
+        ),
+    ]));
+}
+
+#[test]
+fn keys_that_exclude_or_need_each_other() {
+    insta::assert_snapshot!(scenes(&[
+        (
+            "alpha and roughness",
+            "materials: {m: {conductor: {alpha: 0.1, roughness: 0.3}}}"
+        ),
+        (
+            "alpha and anisotropy",
+            "materials: {m: {conductor: {alpha: 0.1, anisotropy: 0.3}}}"
+        ),
+        (
+            "alpha and alpha_x",
+            "materials: {m: {conductor: {alpha: 0.1, alpha_x: 0.3, alpha_y: 1}}}"
+        ),
+        (
+            "alpha_x alone",
+            "materials: {m: {dielectric: {alpha_x: 0.1}}}"
+        ),
+        (
+            "eta without k",
+            "materials: {m: {conductor: {eta: [0.2, 0.9, 1.1]}}}"
+        ),
+        ("k without eta", "materials: {m: {conductor: {k: 3}}}"),
+        ("f82 without f0", "materials: {m: {conductor: {f82: 0.9}}}"),
+        (
+            "two reflectances",
+            "materials: {m: {conductor: {color: 1, metal: gold}}}"
+        ),
+        (
+            "fov and lens",
+            "camera: {projection: {perspective: {fov: 40, lens: 35}}}"
+        ),
+        (
+            "two apertures",
+            "camera: {projection: {perspective: {}}, depth_of_field: {fstop: 2, aperture_radius: 0.1, focus_distance: 1}}"
+        ),
+        (
+            "no aperture",
+            "camera: {projection: {perspective: {}}, depth_of_field: {focus_distance: 1}}"
+        ),
+        (
+            "matrix and location",
+            "lights: [point: {power: 1, transform: {location: [0, 0, 0], matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}]"
+        ),
+        (
+            "look_at and scale",
+            "lights: [point: {power: 1, transform: {scale: 2, look_at: {from: [0, 0, 0], to: [1, 0, 0]}}}]"
+        ),
+        (
+            "material and materials",
+            "meshes: {a: {file: a.obj}}\nmaterials: {m: {diffuse: {}}}\nobjects: [{mesh: a, material: m, materials: {x: m}}]"
+        ),
+    ]));
+}
+
+#[test]
+fn values_out_of_range() {
+    insta::assert_snapshot!(scenes(&[
+        (
+            "roughness above 1",
+            "materials: {m: {conductor: {roughness: 1.5}}}"
+        ),
+        (
+            "alpha below 0",
+            "materials: {m: {conductor: {alpha: -0.5}}}"
+        ),
+        (
+            "one alpha 0",
+            "materials: {m: {conductor: {alpha_x: 0, alpha_y: 0.5}}}"
+        ),
+        (
+            "anisotropy below -1",
+            "materials: {m: {conductor: {anisotropy: -2}}}"
+        ),
+        (
+            "an albedo above 1",
+            "materials: {m: {diffuse: {color: [0.5, 1.5, 0.5]}}}"
+        ),
+        ("ior 0", "materials: {m: {dielectric: {ior: 0}}}"),
+        (
+            "a mix beyond 1",
+            "materials: {m: {mix: {factor: 2, a: {diffuse: {}}, b: {diffuse: {}}}}}"
+        ),
+        ("negative power", "lights: [point: {power: -1}]"),
+        (
+            "a light without area",
+            "lights: [area: {power: 1, shape: {disk: {width: 0, height: 1}}}]"
+        ),
+        (
+            "a light scaled to nothing",
+            "lights: [area: {power: 1, shape: {disk: {width: 1, height: 1}}, transform: {scale: [1, 0, 1]}}]"
+        ),
+        ("a cone of 0 degrees", "lights: [spot: {power: 1, size: 0}]"),
+        ("no pixels", "film: {width: 0, height: 100000}"),
+        ("no samples", "sampling: {spp: 0}"),
+        ("an image twice", "film: {aovs: [normal, depth, normal]}"),
+        (
+            "a field of view of 180 degrees",
+            "camera: {projection: {perspective: {fov: 180}}}"
+        ),
+        (
+            "a camera that looks at itself",
+            "camera: {projection: {perspective: {}}, transform: {look_at: {from: [1, 2, 3], to: [1, 2, 3]}}}"
+        ),
+        (
+            "a camera that looks straight down",
+            "camera: {projection: {perspective: {}}, transform: {look_at: {from: [0, 0, 3], to: [0, 0, 0]}}}"
+        ),
+        (
+            "a flat matrix",
+            "meshes: {a: {file: a.obj}}\nobjects: [{mesh: a, transform: {matrix: [[1, 0, 1, 0], [0, 1, 0, 0], [1, 0, 1, 0], [0, 0, 0, 1]]}}]"
+        ),
+        (
+            "a projective matrix",
+            "meshes: {a: {file: a.obj}}\nobjects: [{mesh: a, transform: {matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]}}]"
+        ),
+    ]));
+}
+
+#[test]
+fn names_that_nothing_has() {
+    let chain = (0..70).fold(
+        "materials:\n  m70: {diffuse: {}}\n".to_owned(),
+        |text, i| {
+            format!(
+                "{text}  m{i}: {{mix: {{a: m{}, b: {{diffuse: {{}}}}}}}}\n",
+                i + 1
+            )
+        },
+    );
+    insta::assert_snapshot!(scenes(&[
+        (
+            "a mesh",
+            "meshes: {sphere: {file: a.obj}}\nobjects: [{mesh: shpere}]"
+        ),
+        (
+            "a material",
+            "meshes: {a: {file: a.obj}}\nmaterials: {gold: {conductor: {}}}\nobjects: [{mesh: a, material: Gold}]"
+        ),
+        (
+            "a slot's material",
+            "meshes: {a: {file: a.obj}}\nobjects: [{mesh: a, materials: {slot: gold}}]"
+        ),
+        (
+            "a texture",
+            "materials: {m: {diffuse: {color: {texture: wood}}}}"
+        ),
+        (
+            "part of a mix",
+            "materials: {m: {mix: {a: n, b: {diffuse: {}}}}}"
+        ),
+        (
+            "a mix of itself",
+            "materials: {m: {mix: {a: n, b: {diffuse: {}}}}, n: {mix: {a: {diffuse: {}}, b: {mix: {a: m, b: m}}}}}"
+        ),
+        ("mixes without end", &chain),
+        (
+            "the name of something faulty is not blamed",
+            "meshes: {a: {file: a.obj}}\nmaterials: {gold: {conductor: {roughnes: 1, alpha: x}}}\nobjects: [{mesh: a, material: gold}]",
+        ),
+    ]));
+}
+
+#[test]
+fn many_problems_at_once() {
+    insta::assert_snapshot!(scenes(&[(
+        "each line has one",
+        "camera: {projection: {perspective: {fov: wide}}}
+film: {width: 0}
+sampling: {estimator: wlak}
+textures: {t: {file: 3}}
+materials:
+  gold: {conductor: {roughness: 0.3, alpha: 0.1}}
+  glass: {dielectric: {ior: -1}}
+  wood: {diffuse: {colour: 1}}
+objects:
+  - {mesh: plane, material: gold}
+  - {mesh: sphere, materail: gold}
+  - {mesh: plane, material: glas}
+lights:
+  - {sun: {strength: -1}}
+  - {lamp: {power: 3}}
+  - {area: {power: 3, shape: {rectangle: {width: 1, height: 0}}}}"
+    )]));
+}
+
+#[test]
+fn overrides() {
+    let scene = "smithwalk: 1\nmaterials: {gold: {conductor: {}}}\nmeshes: {a: {file: a.obj}}\nobjects: [{mesh: a, material: gold}]";
+    let mut said = String::new();
+    for (path, value) in [
+        ("materials.glod.conductor.roughness", "0.3"),
+        ("materials.gold.conductor.rougness", "0.3"),
+        ("materials.gold.conductor.roughness", "3"),
+        ("materials.gold.conductor.roughness", "[1"),
+        ("materials.gold.dielectric.ior", "1.5"),
+        ("objects.1.mesh", "a"),
+        ("objects.Ball.mesh", "a"),
+        ("objects.0.mesh.file", "a"),
+        ("objects.0.material", "god"),
+        ("sampling.spp", ""),
+        ("samplign.spp", "3"),
+        ("", "3"),
+        ("film..width", "3"),
+    ] {
+        let pair = (path.to_owned(), value.to_owned());
+        let problems =
+            Description::from_str(scene, "scene.yaml", &[pair]).expect_err("expected problems");
+        writeln!(said, "# -D {path}={value}\n{problems}\n").unwrap();
+    }
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn materials_that_stand_alone() {
+    let mut said = String::new();
+    for text in [
+        "",
+        "conductor",
+        "condctor: {}",
+        "conductor: {alpha: -1}",
+        "diffuse: {color: {texture: t}}",
+        "mix: {a: x, b: {diffuse: {}}}",
+    ] {
+        let problems = Material::from_yaml(text).expect_err("expected problems");
+        writeln!(said, "# {text}\n{problems}\n").unwrap();
+    }
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn scene_files_that_cannot_be_read() {
+    let directory = directory("bad-scenes");
+    std::fs::write(directory.join("latin1.yaml"), b"smithwalk: 1\n# caf\xe9\n").unwrap();
+    let mut said = String::new();
+    for name in ["missing.yaml", "latin1.yaml", "."] {
+        let problems =
+            Description::load(&directory.join(name), &[]).expect_err("expected problems");
+        writeln!(said, "{}", without(&problems.to_string(), &directory)).unwrap();
+    }
+    insta::assert_snapshot!(said);
+}
+
+/// Machine paths have no place in snapshots.
+fn without(text: &str, directory: &std::path::Path) -> String {
+    text.replace(&directory.display().to_string(), "DIR")
+}
+
+#[test]
+fn meshes() {
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let cases: &[(&str, &[u8])] = &[
+        ("empty", b""),
+        ("no faces", b"v 0 0 0\nv 1 0 0\n"),
+        (
+            "lines and points alone",
+            b"v 0 0 0\nv 1 0 0\nl 1 2\np 1\nf 1 2\n",
+        ),
+        ("NaN", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        (
+            "infinity by overflow",
+            b"v 0 0 1e39\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        ),
+        ("too far away", b"v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        (
+            "a position that is no number",
+            b"v 0 0 x1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        ),
+        (
+            "a digit too many dots",
+            b"v 0 0 1.2.3\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        ),
+        ("two coordinates", b"v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        ("index 0", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n"),
+        ("an index too far", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
+        (
+            "a relative index too far",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n",
+        ),
+        (
+            "the lowest index",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9223372036854775808 2 3\n",
+        ),
+        (
+            "the highest index",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 9223372036854775807 2 3\n",
+        ),
+        (
+            "an index beyond 64 bits",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 99999999999999999999 2 3\n",
+        ),
+        (
+            "a normal that is not there",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//1 3//1\n",
+        ),
+        (
+            "a relative texture coordinate",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/-9 2/1 3/1\n",
+        ),
+        (
+            "a word for an index",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 three\n",
+        ),
+        (
+            "four indices at a corner",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1/1/1 2 3\n",
+        ),
+        (
+            "a face of nothing",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf\nf 1 2 3\n",
+        ),
+        (
+            "a nameless material",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl\nf 1 2 3\n",
+        ),
+        ("no area", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\nf 1 1 2\n"),
+        (
+            "not text",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl caf\xe9\nf 1 2 3\n",
+        ),
+        (
+            "several at once",
+            b"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 9\nf 1 2 x\nusemtl\nf 1 2 0\n",
+        ),
+        ("scaled by 0", b"v 0 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ];
+    assert!(
+        Mesh::read(
+            format!("{TRIANGLE}f 1 2 3\n").as_bytes(),
+            "mesh.obj",
+            Wanted::ALL
+        )
+        .is_ok()
+    );
+    let mut said = String::new();
+    for (what, bytes) in cases {
+        let error = match Mesh::read(*bytes, "mesh.obj", Wanted::ALL) {
+            Ok(_) => panic!("{what}: expected an error, found none"),
+            Err(error) => error,
+        };
+        writeln!(said, "# {what}\n{error}\n").unwrap();
+    }
+    let directory = directory("bad-meshes");
+    for name in ["missing.obj", "."] {
+        let error = Mesh::load(&directory.join(name), Wanted::ALL).expect_err("expected an error");
+        writeln!(
+            said,
+            "# {name}\n{}\n",
+            without(&error.to_string(), &directory)
+        )
+        .unwrap();
+    }
+    insta::assert_snapshot!(said);
+}
+
+/// Encodes a 16 × 16 gradient.
+fn encode(format: image::ImageFormat) -> Vec<u8> {
+    let picture = image::RgbImage::from_fn(16, 16, |x, y| {
+        image::Rgb([(16 * x) as u8, (16 * y) as u8, 7])
+    });
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    match format {
+        image::ImageFormat::Hdr => image::DynamicImage::from(picture)
+            .to_rgb32f()
+            .write_to(&mut bytes, format)
+            .unwrap(),
+        _ => picture.write_to(&mut bytes, format).unwrap(),
+    }
+    bytes.into_inner()
+}
+
+fn encode_exr() -> Vec<u8> {
+    use exr::prelude::*;
+    let channels = SpecificChannels::rgb(|at: Vec2<usize>| (at.x() as f32, at.y() as f32, 7.0_f32));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    Image::from_channels((16, 16), channels)
+        .write()
+        .to_buffered(&mut bytes)
+        .unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn images() {
+    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
+    let directory = directory("bad-images");
+    let load = |name: &str| {
+        Texture::load(
+            &directory.join(name),
+            ColorSpace::Srgb,
+            Interpolation::Bilinear,
+            [1.0; 2],
+            [0.0; 2],
+        )
+        .map(|_| ())
+    };
+    let mut said = String::new();
+    let whole = [
+        ("png", encode(Png)),
+        ("jpg", encode(Jpeg)),
+        ("tif", encode(Tiff)),
+        ("hdr", encode(Hdr)),
+        ("exr", encode_exr()),
+    ];
+    for (extension, bytes) in &whole {
+        std::fs::write(directory.join(format!("whole.{extension}")), bytes).unwrap();
+        assert_eq!(load(&format!("whole.{extension}")), Ok(()), "{extension}");
+        for (name, length) in [
+            ("header", 12),
+            ("half", bytes.len() / 2),
+            ("end", bytes.len() - 24),
+        ] {
+            let name = format!("{name}.{extension}");
+            std::fs::write(directory.join(&name), &bytes[..length]).unwrap();
+            let answer = match load(&name) {
+                Ok(()) => "read as if it were whole".to_owned(),
+                Err(error) => without(&error.to_string(), &directory),
+            };
+            writeln!(said, "# {name}\n{answer}\n").unwrap();
+        }
+    }
+    std::fs::write(directory.join("empty.png"), "").unwrap();
+    std::fs::write(directory.join("text.png"), "this is no image").unwrap();
+    for name in ["missing.png", "empty.png", "text.png", "."] {
+        let error = load(name).expect_err("expected an error");
+        writeln!(
+            said,
+            "# {name}\n{}\n",
+            without(&error.to_string(), &directory)
+        )
+        .unwrap();
+    }
+    let error = load_environment(&directory.join("whole.png")).expect_err("expected an error");
+    writeln!(
+        said,
+        "# an environment of 8 bits\n{}\n",
+        without(&error.to_string(), &directory)
+    )
+    .unwrap();
+    insta::assert_snapshot!(said);
+}
