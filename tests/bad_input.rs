@@ -367,6 +367,7 @@ fn without(text: &str, directory: &std::path::Path) -> String {
 #[test]
 fn meshes() {
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let early = format!("{}f 1 2 4\n{TRIANGLE}", "f 1 2 3\n".repeat(30));
     let cases: &[(&str, &[u8])] = &[
         ("empty", b""),
         ("no faces", b"v 0 0 0\nv 1 0 0\n"),
@@ -439,6 +440,10 @@ fn meshes() {
         (
             "several at once",
             b"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 9\nf 1 2 x\nusemtl\nf 1 2 0\n",
+        ),
+        (
+            "an index too far among many that come early",
+            early.as_bytes(),
         ),
         ("scaled by 0", b"v 0 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
     ];
