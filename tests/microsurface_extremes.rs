@@ -23,7 +23,10 @@ where
 {
     fn draw(&mut self) -> F {
         self.drawn += 1;
-        self.first.get(self.drawn - 1).copied().unwrap_or_else(|| self.rest.draw())
+        self.first
+            .get(self.drawn - 1)
+            .copied()
+            .unwrap_or_else(|| self.rest.draw())
     }
 }
 
@@ -43,7 +46,18 @@ const ALPHAS: [(f64, f64); 12] = [
     (1e-3, 1e3),
 ];
 
-const COSINES: [f64; 10] = [1.0, 1.0 - 1e-7, 0.99995, 0.7, 0.1, 1e-3, 1e-5, 1e-8, 1e-12, 0.0];
+const COSINES: [f64; 10] = [
+    1.0,
+    1.0 - 1e-7,
+    0.99995,
+    0.7,
+    0.1,
+    1e-3,
+    1e-5,
+    1e-8,
+    1e-12,
+    0.0,
+];
 
 /// A direction at exactly this cosine, also where 1 − cos² rounds to 1 or 0.
 fn direction<F: Real>(cos: f64, phi: f64) -> Vector3<F> {
@@ -56,27 +70,68 @@ fn valid<F: Real>(value: Rgb<F>) -> bool {
 }
 
 /// One surface and pair of directions through every entry point.
-fn exercise<F: Real, N: Ndf<F>, I: Facets<F>>(what: &str, surface: &Microsurface<N, I>, wi: Vector3<F>, wo: Vector3<F>, first: &[F], seed: u64) -> usize
+fn exercise<F: Real, N: Ndf<F>, I: Facets<F>>(
+    what: &str,
+    surface: &Microsurface<N, I>,
+    wi: Vector3<F>,
+    wo: Vector3<F>,
+    first: &[F],
+    seed: u64,
+) -> usize
 where
     Stream<Pcg64Mcg>: Draw<F>,
 {
-    let mut rng = Metered { first, rest: stream(seed), drawn: 0 };
+    let mut rng = Metered {
+        first,
+        rest: stream(seed),
+        drawn: 0,
+    };
     let context = || format!("{what}, {wi:?} → {wo:?}, first draws {first:?}, seed {seed}");
-    for exit in [surface.sample(wi, &mut rng), surface.sample_single(wi, &mut rng)].into_iter().flatten() {
+    for exit in [
+        surface.sample(wi, &mut rng),
+        surface.sample_single(wi, &mut rng),
+    ]
+    .into_iter()
+    .flatten()
+    {
         assert!(valid(exit.weight), "{}: {exit:?}", context());
         let length = exit.direction.length().as_f64();
-        assert!((length - 1.0).abs() < 1e-5, "{}: {exit:?} of length {length}", context());
-        assert!(exit.direction.z != F::zero() && exit.order >= 1, "{}: {exit:?}", context());
+        assert!(
+            (length - 1.0).abs() < 1e-5,
+            "{}: {exit:?} of length {length}",
+            context()
+        );
+        assert!(
+            exit.direction.z != F::zero() && exit.order >= 1,
+            "{}: {exit:?}",
+            context()
+        );
         let pdf = surface.pdf(wi, exit.direction);
-        assert!(pdf.is_finite() && (pdf > F::zero() || surface.facets.invisible().is_some()), "{}: {exit:?} has pdf {pdf:?}", context());
+        assert!(
+            pdf.is_finite() && (pdf > F::zero() || surface.facets.invisible().is_some()),
+            "{}: {exit:?} has pdf {pdf:?}",
+            context()
+        );
         let pdf = surface.pdf_single(wi, exit.direction);
-        assert!(pdf.is_finite() && pdf >= F::zero(), "{}: {exit:?} has pdf_single {pdf:?}", context());
+        assert!(
+            pdf.is_finite() && pdf >= F::zero(),
+            "{}: {exit:?} has pdf_single {pdf:?}",
+            context()
+        );
     }
     for estimator in [Estimator::Walk, Estimator::TwoWalk, Estimator::PositionFree] {
         let mut total = Total::default();
-        let mut metered = Metered { first, rest: stream(seed), drawn: 0 };
+        let mut metered = Metered {
+            first,
+            rest: stream(seed),
+            drawn: 0,
+        };
         surface.eval(estimator, wi, wo, &mut metered, &mut total);
-        assert!(valid(total.0), "{}: {estimator:?} gives {total:?}", context());
+        assert!(
+            valid(total.0),
+            "{}: {estimator:?} gives {total:?}",
+            context()
+        );
         rng.drawn += metered.drawn;
     }
     let single = surface.eval_single(wi, wo, &mut rng);
@@ -85,7 +140,14 @@ where
 }
 
 /// All the facets on one distribution of normals.
-fn exercise_all<F: Real, N: Ndf<F>>(name: &str, ndf: N, wi: Vector3<F>, wo: Vector3<F>, first: &[F], seed: u64) -> usize
+fn exercise_all<F: Real, N: Ndf<F>>(
+    name: &str,
+    ndf: N,
+    wi: Vector3<F>,
+    wo: Vector3<F>,
+    first: &[F],
+    seed: u64,
+) -> usize
 where
     Stream<Pcg64Mcg>: Draw<F>,
 {
@@ -93,19 +155,67 @@ where
     let mut most = 0;
     for fresnel in [
         ConductorFresnel::Constant(rgb([1.0, 0.5, 0.0])),
-        ConductorFresnel::Complex { eta: rgb([1e-3, 1.0, 1e3]), k: rgb([1e4, 0.0, 1.0]) },
+        ConductorFresnel::Complex {
+            eta: rgb([1e-3, 1.0, 1e3]),
+            k: rgb([1e4, 0.0, 1.0]),
+        },
     ] {
-        let surface = Microsurface { ndf, facets: Conductor { fresnel } };
-        most = most.max(exercise(&format!("{name} {fresnel:?}"), &surface, wi, wo, first, seed));
+        let surface = Microsurface {
+            ndf,
+            facets: Conductor { fresnel },
+        };
+        most = most.max(exercise(
+            &format!("{name} {fresnel:?}"),
+            &surface,
+            wi,
+            wo,
+            first,
+            seed,
+        ));
     }
-    for eta in [1e-3, 0.5, 1.0 - 1e-7, 1.0 - 1e-4, 1.0, 1.0 + 1e-7, 1.0 + 1e-5, 1.5, 1e3] {
-        let surface = Microsurface { ndf, facets: Dielectric { eta: F::of(eta), tint: Rgb::white() } };
+    for eta in [
+        1e-3,
+        0.5,
+        1.0 - 1e-7,
+        1.0 - 1e-4,
+        1.0,
+        1.0 + 1e-7,
+        1.0 + 1e-5,
+        1.5,
+        1e3,
+    ] {
+        let surface = Microsurface {
+            ndf,
+            facets: Dielectric {
+                eta: F::of(eta),
+                tint: Rgb::white(),
+            },
+        };
         for wo in [wo, -wo] {
-            most = most.max(exercise(&format!("{name} η {eta}"), &surface, wi, wo, first, seed));
+            most = most.max(exercise(
+                &format!("{name} η {eta}"),
+                &surface,
+                wi,
+                wo,
+                first,
+                seed,
+            ));
         }
     }
-    let surface = Microsurface { ndf, facets: Diffuse { albedo: rgb([0.9, 0.0, 0.5]) } };
-    most.max(exercise(&format!("{name} diffuse"), &surface, wi, wo, first, seed))
+    let surface = Microsurface {
+        ndf,
+        facets: Diffuse {
+            albedo: rgb([0.9, 0.0, 0.5]),
+        },
+    };
+    most.max(exercise(
+        &format!("{name} diffuse"),
+        &surface,
+        wi,
+        wo,
+        first,
+        seed,
+    ))
 }
 
 /// The grid in one precision; the largest number of draws of a call.
@@ -115,17 +225,47 @@ where
 {
     let largest = F::one() - F::epsilon() / F::of(2.0);
     let (zero, half) = (F::zero(), F::of(0.5));
-    let starts: [&[F]; 5] = [&[], &[zero; 12], &[largest; 12], &[half, zero, largest, zero, largest], &[zero, largest, half, largest]];
+    let starts: [&[F]; 5] = [
+        &[],
+        &[zero; 12],
+        &[largest; 12],
+        &[half, zero, largest, zero, largest],
+        &[zero, largest, half, largest],
+    ];
     let mut most = 0;
     for (ax, ay) in ALPHAS {
         let (alpha_x, alpha_y) = (F::of(ax), F::of(ay));
         for (i, ci) in COSINES.into_iter().enumerate() {
             for (o, co) in COSINES.into_iter().enumerate() {
                 let first = starts[(i + o) % starts.len()];
-                let (wi, wo) = (direction(ci, 0.3), direction(co, if o % 2 == 0 { 0.3 + std::f64::consts::PI } else { 1.0 }));
+                let (wi, wo) = (
+                    direction(ci, 0.3),
+                    direction(
+                        co,
+                        if o % 2 == 0 {
+                            0.3 + std::f64::consts::PI
+                        } else {
+                            1.0
+                        },
+                    ),
+                );
                 let seed = (i * COSINES.len() + o) as u64;
-                most = most.max(exercise_all(&format!("GGX {ax} {ay}"), Ggx { alpha_x, alpha_y }, wi, wo, first, seed));
-                most = most.max(exercise_all(&format!("Beckmann {ax} {ay}"), Beckmann { alpha_x, alpha_y }, wi, wo, first, seed));
+                most = most.max(exercise_all(
+                    &format!("GGX {ax} {ay}"),
+                    Ggx { alpha_x, alpha_y },
+                    wi,
+                    wo,
+                    first,
+                    seed,
+                ));
+                most = most.max(exercise_all(
+                    &format!("Beckmann {ax} {ay}"),
+                    Beckmann { alpha_x, alpha_y },
+                    wi,
+                    wo,
+                    first,
+                    seed,
+                ));
                 if ax == 1.0 && ay == 1.0 {
                     most = most.max(exercise_all("Quadratic", Quadratic, wi, wo, first, seed));
                 }
