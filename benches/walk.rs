@@ -91,7 +91,7 @@ fn surfaces() -> Vec<(String, bool, Box<dyn Surface>)> {
             }),
         ));
     }
-    for alpha in [0.5] {
+    for alpha in [0.2, 0.5] {
         list.push((
             format!("conductor, Beckmann α {alpha}"),
             true,
