@@ -237,15 +237,18 @@ fn values_out_of_range() {
 
 #[test]
 fn names_that_nothing_has() {
-    let chain = (0..70).fold(
-        "materials:\n  m70: {diffuse: {}}\n".to_owned(),
-        |text, i| {
-            format!(
-                "{text}  m{i}: {{mix: {{a: m{}, b: {{diffuse: {{}}}}}}}}\n",
-                i + 1
-            )
-        },
-    );
+    let leaf = "materials:\n  leaf: {diffuse: {}}\n  m069: {mix: {a: leaf, b: leaf}}\n".to_owned();
+    let chain = (0..69).fold(leaf.clone(), |text, i| {
+        format!("{text}  m{i:03}: {{mix: {{a: m{:03}, b: leaf}}}}\n", i + 1)
+    });
+    // Names sorted the other way round: each finds the next one done.
+    let reversed = (0..69).fold(leaf, |text, i| {
+        format!(
+            "{text}  m{:03}: {{mix: {{a: m{:03}, b: leaf}}}}\n",
+            138 - i,
+            if i == 68 { 69 } else { 137 - i }
+        )
+    });
     insta::assert_snapshot!(scenes(&[
         (
             "a mesh",
@@ -272,6 +275,7 @@ fn names_that_nothing_has() {
             "materials: {m: {mix: {a: n, b: {diffuse: {}}}}, n: {mix: {a: {diffuse: {}}, b: {mix: {a: m, b: m}}}}}"
         ),
         ("mixes without end", &chain),
+        ("mixes without end, last first", &reversed),
         (
             "the name of something faulty is not blamed",
             "meshes: {a: {file: a.obj}}\nmaterials: {gold: {conductor: {roughnes: 1, alpha: x}}}\nobjects: [{mesh: a, material: gold}]",
