@@ -328,7 +328,7 @@ impl Outline {
 /// A rectangle seen from a point, sampled uniformly in solid angle (Ureña,
 /// Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical
 /// Rectangles"; names as there). In f64: at grazing views the arc cosines lose
-/// half of the digits.
+/// half of the digits. The squares of an f32 stay within the range of f64.
 struct SphericalRectangle {
     z0: f64,
     b0: f64,
@@ -344,7 +344,7 @@ impl SphericalRectangle {
         let (x, y) = relative(local, window);
         let z0 = -local.z;
         // The z of the inward normals of the planes through p and the edges.
-        let slope = |a: f64| a / a.hypot(z0);
+        let slope = |a: f64| a / (a * a + z0 * z0).sqrt();
         let normals = [-slope(y[0]), slope(x[1]), slope(y[1]), -slope(x[0])];
         let angle = |i: usize, j: usize| (-normals[i] * normals[j]).clamp(-1.0, 1.0).acos();
         let k = TAU - angle(2, 3) - angle(3, 0);
@@ -365,7 +365,7 @@ impl SphericalRectangle {
         let au = f64::from(u[0]) * self.solid_angle + self.k;
         let (sin, cos) = au.sin_cos();
         let fu = (cos * self.b0 - self.b1) / sin;
-        let cu = (1.0_f64.copysign(fu) / fu.hypot(self.b0)).clamp(-1.0, 1.0);
+        let cu = (1.0_f64.copysign(fu) / (fu * fu + self.b0 * self.b0).sqrt()).clamp(-1.0, 1.0);
         let xu = -cu * self.z0 / (1.0 - cu * cu).sqrt();
         // Rounding can leave the rectangle, and 0/0 on its edge leaves the numbers.
         let xu = if xu.is_nan() {
@@ -373,8 +373,8 @@ impl SphericalRectangle {
         } else {
             xu.clamp(x[0], x[1])
         };
-        let d = xu.hypot(self.z0);
-        let h = y.map(|y| y / y.hypot(d));
+        let d = (xu * xu + self.z0 * self.z0).sqrt();
+        let h = y.map(|y| y / (y * y + d * d).sqrt());
         let hv = h[0] + f64::from(u[1]) * (h[1] - h[0]);
         let yv = (hv * d / (1.0 - hv * hv).max(f64::MIN_POSITIVE).sqrt()).clamp(y[0], y[1]);
         [(xu + local.x) as f32, (yv + local.y) as f32]

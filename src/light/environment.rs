@@ -3,6 +3,7 @@
 use super::select;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
+use crate::texture::EnvironmentImage;
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -22,10 +23,11 @@ pub struct Environment {
     pixels: Vec<[f32; 3]>,
     scale: Rgb,
     to_image: Mat3,
-    /// Running sums of the rows' probabilities.
-    rows: Vec<f32>,
+    rows: select::Table,
     /// Running sums of the probabilities of the texels within each row.
     columns: Vec<f32>,
+    /// Where to look in each row's sums.
+    guides: Vec<u32>,
     /// sin of the elevation at the upper edge of each row, and below the last.
     sin_edges: Vec<f64>,
     /// The luminance of the irradiance of a surface averaged over orientations
@@ -34,27 +36,19 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Of `width` × `height` texels, the upper row first. `scale` makes a texel
-    /// a radiance in W·m⁻²·sr⁻¹; `to_image` turns world directions into the
-    /// image's. Texels that are negative or not finite count as black. `None`
-    /// when nothing shines.
+    /// `scale` makes a texel a radiance in W·m⁻²·sr⁻¹; `to_image` turns world
+    /// directions into the image's. `None` when nothing shines.
     ///
     /// # Panics
-    /// When `pixels` has not `width · height` entries.
+    /// When the image has not as many pixels as it says.
     #[must_use]
-    pub fn new(
-        width: usize,
-        height: usize,
-        mut pixels: Vec<[f32; 3]>,
-        scale: Rgb,
-        to_image: Mat3,
-    ) -> Option<Self> {
+    pub fn new(image: EnvironmentImage, scale: Rgb, to_image: Mat3) -> Option<Self> {
+        let EnvironmentImage {
+            width,
+            height,
+            pixels,
+        } = image;
         assert_eq!(pixels.len(), width * height, "the image's size");
-        for channel in pixels.as_flattened_mut() {
-            if !(channel.is_finite() && *channel > 0.0) {
-                *channel = 0.0;
-            }
-        }
         let sin_edges: Vec<f64> = (0..=height)
             .map(|row| (std::f64::consts::PI * (0.5 - row as f64 / height as f64)).sin())
             .collect();
@@ -79,8 +73,12 @@ impl Environment {
                 (sin_edges[y] - sin_edges[y + 1]) * std::f64::consts::TAU / width as f64;
             row_weights.push(row.unwrap_or(0.0) * solid_angle);
         }
-        let mut rows = Vec::with_capacity(height);
-        let total = select::accumulate(row_weights.iter().copied(), &mut rows)?;
+        let total: f64 = row_weights.iter().sum();
+        let rows = select::Table::new(row_weights.into_iter())?;
+        let mut guides = Vec::with_capacity(height * select::guide_length(width));
+        for row in columns.chunks_exact(width) {
+            select::guide_through(row, &mut guides);
+        }
         Some(Self {
             width,
             height,
@@ -89,6 +87,7 @@ impl Environment {
             to_image,
             rows,
             columns,
+            guides,
             sin_edges,
             irradiance: (total / 2.0) as f32,
         })
@@ -106,7 +105,8 @@ impl Environment {
     pub fn bytes(&self) -> usize {
         size_of_val(self.pixels.as_slice())
             + size_of_val(self.columns.as_slice())
-            + size_of_val(self.rows.as_slice())
+            + size_of_val(self.guides.as_slice())
+            + self.rows.bytes()
             + size_of_val(self.sin_edges.as_slice())
     }
 
@@ -121,7 +121,7 @@ impl Environment {
         let (column, row) = self.raster(direction);
         let x = (column as usize).min(self.width - 1);
         let y = (row as usize).min(self.height - 1);
-        let probability = select::probability(&self.rows, y) * select::probability(self.row(y), x);
+        let probability = self.rows.probability(y) * select::probability(self.row(y), x);
         (
             self.bilinear(column, row),
             probability * self.per_steradian(y),
@@ -131,8 +131,8 @@ impl Environment {
     /// Samples a direction; `selection` is the probability with which this
     /// light was chosen.
     pub(super) fn sample(&self, selection: f32, u: [f32; 2]) -> LightSample {
-        let (y, row_probability, in_row) = select::sample(&self.rows, u[1]);
-        let (x, texel_probability, in_texel) = select::sample(self.row(y), u[0]);
+        let (y, row_probability, in_row) = self.rows.sample(u[1]);
+        let (x, texel_probability, in_texel) = select::sample(self.row(y), self.guide(y), u[0]);
         let column = x as f32 + in_texel;
         // In f64: next to the poles of a fine image, rows differ by less than
         // the sine's last digit in f32.
@@ -156,6 +156,12 @@ impl Environment {
     /// The running sums of a row.
     fn row(&self, y: usize) -> &[f32] {
         &self.columns[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The guide through [`Environment::row`].
+    fn guide(&self, y: usize) -> &[u32] {
+        let length = select::guide_length(self.width);
+        &self.guides[y * length..(y + 1) * length]
     }
 
     /// One over the solid angle of a texel of row `y`, sr⁻¹.

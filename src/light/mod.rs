@@ -19,7 +19,7 @@ pub(crate) mod warp;
 pub use area::{AreaLight, Outline};
 pub use environment::Environment;
 pub use point::{Beam, Bulb, PointLight};
-pub use resolve::{LightError, resolve_light};
+pub use resolve::{LightError, resolve_light, resolve_world};
 pub use sun::SunLight;
 pub use triangles::{EmissiveTriangle, EmitterId};
 

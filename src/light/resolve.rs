@@ -1,10 +1,14 @@
 //! From the watts and degrees of a scene file to radiometry.
 
-use super::{AreaLight, Beam, Bulb, Light, Outline, PointLight, Shape, SunLight};
+use super::{
+    AreaLight, Beam, Bulb, Environment, Light, Outline, PointLight, Shape, SunLight, World,
+};
 use crate::color::Rgb;
 use crate::description::{self, AreaShape, LightKind, LightUnits};
-use glam::{Affine3A, Mat3};
+use crate::texture::EnvironmentImage;
+use glam::{Affine3A, EulerRot, Mat3};
 use std::f32::consts::PI;
+use std::path::Path;
 
 /// Suns of a smaller half-angle, in radians, are parallel light: directions in
 /// f32 tell no more.
@@ -31,8 +35,9 @@ pub enum LightError {
 ///
 /// With P in watts and colour folded in, per steradian and square metre:
 /// points and spots shine with P/4π, area lights with P/(πA) (before Blender
-/// 4.0: P/(4A)), suns with strength/(π sin²(angle/2)) (before: tan²). Point
-/// lights keep their radius whatever the scale.
+/// 4.0: P/(4A)), suns with strength/(π sin²(angle/2)) (before: tan², by which
+/// a wide sun fell short of its strength by cos²(angle/2)). Point lights keep
+/// their radius whatever the scale.
 ///
 /// # Errors
 /// [`LightError`], when there is no such light.
@@ -121,5 +126,36 @@ pub fn resolve_light(
     Ok(Light {
         shape,
         visible_to_camera: light.visible_to_camera,
+    })
+}
+
+/// Turns the surroundings into radiance; `load` reads the image when there is
+/// one. What does not shine becomes constant black.
+///
+/// # Errors
+/// Those of `load`.
+pub fn resolve_world<E>(
+    world: &description::World,
+    load: impl FnOnce(&Path) -> Result<EnvironmentImage, E>,
+) -> Result<World, E> {
+    Ok(match world {
+        description::World::Constant { color, strength } => {
+            World::Constant(Rgb::from(*color) * *strength)
+        }
+        description::World::Environment {
+            file,
+            strength,
+            color,
+            rotation,
+        } => {
+            let scale = Rgb::from(*color) * *strength;
+            let [x, y, z] = rotation.map(f32::to_radians);
+            // About x first: the last factor.
+            let to_image = Mat3::from_euler(EulerRot::ZYX, z, y, x);
+            match Environment::new(load(file)?, scale, to_image) {
+                Some(environment) => World::Environment(Box::new(environment)),
+                None => World::Constant(Rgb::ZERO),
+            }
+        }
     })
 }

@@ -133,6 +133,32 @@ impl<N, I> Microsurface<N, I> {
         }
     }
 
+    /// The estimator with the least variance in a given time, as measured by
+    /// `benches/walk.rs`: position-free for conductors, two walks otherwise.
+    pub fn best_estimator<F: Real>(&self) -> Estimator
+    where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        // Orders go up with Λ; from some ten on, the stages of the depth are
+        // too many.
+        if I::MIRRORS && self.steep_lambda() < F::of(5.0) {
+            Estimator::PositionFree
+        } else {
+            Estimator::TwoWalk
+        }
+    }
+
+    /// Λ at tanθ = 2, between the axes: a one-number summary of roughness.
+    #[inline]
+    fn steep_lambda<F: Real>(&self) -> F
+    where
+        N: Ndf<F>,
+    {
+        let (side, up) = (F::of(0.4f64.sqrt()), F::of(0.2f64.sqrt()));
+        self.ndf.lambda(Vector3::new(side, side, up))
+    }
+
     /// Whether light can go from `wi` to `wo` other than straight on.
     #[inline]
     fn links<F: Real>(&self, wi: Vector3<F>, wo: Vector3<F>) -> bool

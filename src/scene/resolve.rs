@@ -7,14 +7,14 @@ use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::load::Assets;
 use super::materials::{Names, compile_material};
-use super::transform::{euler, to_affine};
+use super::transform::to_affine;
 use super::{Features, Leaf, Material, Number, Object, Roughness, Scene, SceneMesh, Tangent};
 use crate::bsdf::Method;
 use crate::camera::Camera;
 use crate::color::Rgb;
-use crate::description::{Assignment, Description, World as WorldDescription};
+use crate::description::{Assignment, Description};
 use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
-use crate::light::{EmissiveTriangle, Environment, Light, Lights, World, resolve_light};
+use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::mesh::Mesh;
 use crate::scene::material::{Facet, Tint};
 use crate::texture::Texture;
@@ -109,7 +109,15 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
             Err(error) => problems.push(format!("lights.{index}: {error}")),
         }
     }
-    let world = world(description, environment);
+    // The image was read with the other files; a world without one has none.
+    let world = match &description.world {
+        None => World::Constant(Rgb::ZERO),
+        Some(world) => resolve_world(world, |_| environment.ok_or("the world's image is missing"))
+            .unwrap_or_else(|error| {
+                problems.push(format!("world: {error}"));
+                World::Constant(Rgb::ZERO)
+            }),
+    };
     let triangles = emissive_triangles(&mut objects, &scene_meshes, &materials, &textures);
     let camera = description.camera.as_ref().map(|camera| {
         let resolution = [description.film.width, description.film.height];
@@ -372,33 +380,6 @@ fn box_of(object: &Object, mesh: &SceneMesh) -> Affine3A {
     let to_box = Affine3A::from_scale(Vec3::from(size.recip().min(Vec3A::splat(f32::MAX))))
         * Affine3A::from_translation(Vec3::from(-(low + high) * 0.5));
     to_box * to_local
-}
-
-fn world(description: &Description, image: Option<crate::texture::EnvironmentImage>) -> World {
-    match &description.world {
-        None => World::Constant(Rgb::ZERO),
-        Some(WorldDescription::Constant { color, strength }) => {
-            World::Constant(Rgb::from(*color) * *strength)
-        }
-        Some(WorldDescription::Environment {
-            strength,
-            color,
-            rotation,
-            ..
-        }) => image
-            .and_then(|image| {
-                Environment::new(
-                    image.width,
-                    image.height,
-                    image.pixels,
-                    Rgb::from(*color) * *strength,
-                    euler(*rotation),
-                )
-            })
-            .map_or(World::Constant(Rgb::ZERO), |e| {
-                World::Environment(Box::new(e))
-            }),
-    }
 }
 
 fn has_radial_tangent(material: &Material) -> bool {

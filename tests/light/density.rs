@@ -203,3 +203,47 @@ fn camera_rays_see_only_visible_lights() {
         assert_eq!(count(&Ray::new(Vec3::Z * 2.0, Vec3::NEG_Z), false), 0);
     }
 }
+
+/// Shadow rays end at the light: how far a sample's point is from the surface
+/// it should be on, by the surface's own equation.
+#[test]
+fn samples_lie_on_their_lights() {
+    type Equation = fn(Vec3) -> f32;
+    let center = Vec3::new(0.2, 0.3, 1.0);
+    let near = Vec3::new(0.2, 0.3, 0.1);
+    let cases: [(&str, Shape, Equation); 4] = [
+        ("a sphere", bulb(center, 1.0, Bulb::Sphere(0.7)), |at| {
+            // The side that faces the origin.
+            let outward = (at - Vec3::new(0.2, 0.3, 1.0)) / 0.7;
+            (outward.length() - 1.0).abs() + outward.dot(at).max(0.0)
+        }),
+        (
+            "inside a sphere",
+            bulb(near, 1.0, Bulb::Sphere(0.7)),
+            |at| (at - Vec3::new(0.2, 0.3, 0.1)).length() - 0.7,
+        ),
+        ("a soft bulb", bulb(center, 1.0, Bulb::Disk(0.7)), |at| {
+            let center = Vec3::new(0.2, 0.3, 1.0);
+            let off_plane = (at - center).dot(center.normalize()).abs();
+            off_plane + ((at - center).length() - 0.7).max(0.0)
+        }),
+        (
+            "a disk",
+            area(center, Outline::Ellipse, [1.0, 2.0], 1.0),
+            |at| {
+                let (x, y) = ((at.x - 0.2) / 0.5, at.y - 0.3);
+                (at.z - 1.0).abs() + (x.hypot(y) - 1.0).max(0.0)
+            },
+        ),
+    ];
+    let mut rng = rng(50);
+    for (name, shape, equation) in cases {
+        let lights = lamps([shape]);
+        for _ in 0..2000 {
+            let sample = lights.sample(Vec3::ZERO, 0.5, pair(&mut rng)).unwrap();
+            let off = equation(sample.direction * sample.distance);
+            // A grazing view of the sphere doubles the digits lost: √ε.
+            assert!(off.abs() < 1e-3, "{name}: {off}");
+        }
+    }
+}

@@ -1,9 +1,11 @@
 //! The surroundings: orientation, densities, energy.
 
 use crate::common::*;
-use glam::{DVec3, EulerRot, Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use rand::RngExt;
-use smithwalk::light::{Environment, Lights, World};
+use smithwalk::description;
+use smithwalk::light::{Environment, Lights, World, resolve_world};
+use smithwalk::texture::EnvironmentImage;
 use std::f64::consts::PI;
 
 fn lights(environment: Environment) -> Lights {
@@ -21,10 +23,30 @@ fn noise(width: usize, height: usize, seed: u64) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Blender's Euler angles, in degrees: about x first, then y, then z.
-fn blender_rotation([x, y, z]: [f32; 3]) -> Mat3 {
-    let [x, y, z] = [x, y, z].map(f32::to_radians);
-    Mat3::from_euler(EulerRot::ZYX, z, y, x)
+fn image(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> EnvironmentImage {
+    EnvironmentImage {
+        width,
+        height,
+        pixels,
+    }
+}
+
+fn unturned(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Option<Environment> {
+    Environment::new(image(width, height, pixels), Vec3::ONE, Mat3::IDENTITY)
+}
+
+/// As a scene file asks for it, with Blender's Euler angles in degrees.
+fn turned(image: EnvironmentImage, rotation: [f32; 3]) -> Environment {
+    let world = description::World::Environment {
+        file: "sky.exr".into(),
+        strength: 2.0,
+        color: [0.5; 3],
+        rotation,
+    };
+    match resolve_world::<()>(&world, |_| Ok(image)) {
+        Ok(World::Environment(environment)) => *environment,
+        other => panic!("{other:?} is no environment"),
+    }
 }
 
 #[test]
@@ -34,9 +56,8 @@ fn texels_are_where_blender_has_them() {
     let pixels: Vec<[f32; 3]> = (0..width * height)
         .map(|i| [(i % width + 1) as f32, (i / width + 1) as f32, 0.0])
         .collect();
-    let at = |to_image: Mat3, direction: Vec3| {
-        let environment =
-            Environment::new(width, height, pixels.clone(), Vec3::ONE, to_image).unwrap();
+    let at = |rotation: [f32; 3], direction: Vec3| {
+        let environment = turned(image(width, height, pixels.clone()), rotation);
         environment.radiance(direction.normalize())
     };
     let near = |a: Vec3, b: [f32; 2]| {
@@ -45,7 +66,7 @@ fn texels_are_where_blender_has_them() {
             "{a} is not {b:?}"
         );
     };
-    let identity = Mat3::IDENTITY;
+    let identity = [0.0; 3];
     // +x is the middle of the image: between columns 4 and 5, rows 2 and 3.
     near(at(identity, Vec3::X), [4.5, 2.5]);
     // +y is a quarter to the left of it, −y to the right; −x is the seam.
@@ -65,15 +86,15 @@ fn texels_are_where_blender_has_them() {
     );
     near(at(identity, direction.as_vec3()), [3.0, 2.0]);
     // A Mapping node that turns by 90° about z sends +x to where +y was.
-    near(at(blender_rotation([0.0, 0.0, 90.0]), Vec3::X), [2.5, 2.5]);
+    near(at([0.0, 0.0, 90.0], Vec3::X), [2.5, 2.5]);
     // First x by 90°: z to −y; then z by 90°: −y to +x.
-    near(at(blender_rotation([90.0, 0.0, 90.0]), Vec3::Z), [4.5, 2.5]);
+    near(at([90.0, 0.0, 90.0], Vec3::Z), [4.5, 2.5]);
 }
 
 #[test]
 fn a_grey_image_is_a_constant_world() {
-    let pixels = vec![[0.5; 3]; 32 * 16];
-    let environment = Environment::new(32, 16, pixels, Vec3::splat(2.0), Mat3::IDENTITY).unwrap();
+    let pixels = vec![[1.0; 3]; 32 * 16];
+    let environment = turned(image(32, 16, pixels), [0.0; 3]);
     let lights = lights(environment);
     irradiance(&lights, Vec3::ZERO, Vec3::X, 200_000, 50).assert_is(PI, "a grey sky");
     let (radiance, pdf) = lights.world(Vec3::ZERO, Vec3::new(0.6, 0.0, 0.8));
@@ -89,15 +110,8 @@ fn samples_agree_with_quadrature_and_their_density() {
         .into_iter()
         .enumerate()
     {
-        let to_image = blender_rotation([30.0, -50.0, 110.0]);
-        let environment = Environment::new(
-            width,
-            height,
-            noise(width, height, 60 + i as u64),
-            Vec3::ONE,
-            to_image,
-        )
-        .unwrap();
+        let pixels = noise(width, height, 60 + i as u64);
+        let environment = turned(image(width, height, pixels), [30.0, -50.0, 110.0]);
         let normal = Vec3::new(0.3, 0.5, 0.8).normalize();
         // The midpoint rule in azimuth and z.
         let n = 1500;
@@ -143,7 +157,7 @@ fn nothing_that_shines_has_density_zero() {
     // One bright texel spreads by half a texel around through interpolation.
     let mut pixels = vec![[0.0; 3]; 16 * 8];
     pixels[3 * 16] = [1e6; 3];
-    let environment = Environment::new(16, 8, pixels, Vec3::ONE, Mat3::IDENTITY).unwrap();
+    let environment = unturned(16, 8, pixels).unwrap();
     let lights = lights(environment);
     let mut rng = rng(80);
     let mut bright = 0;
@@ -164,7 +178,7 @@ fn poles_of_fine_images_keep_their_digits() {
     let mut pixels = vec![[0.0; 3]; width * height];
     pixels[0] = [1.0; 3];
     pixels[1] = [1.0; 3];
-    let environment = Environment::new(width, height, pixels, Vec3::ONE, Mat3::IDENTITY).unwrap();
+    let environment = unturned(width, height, pixels).unwrap();
     let lights = lights(environment);
     let mut rng = rng(81);
     let row = PI / height as f64;
@@ -192,22 +206,27 @@ fn poles_of_fine_images_keep_their_digits() {
 }
 
 #[test]
-fn broken_and_black_images_are_met() {
-    let image = |pixels: Vec<[f32; 3]>| Environment::new(2, 1, pixels, Vec3::ONE, Mat3::IDENTITY);
-    assert!(image(vec![[0.0; 3]; 2]).is_none());
-    assert!(image(vec![[f32::NAN, -1.0, f32::INFINITY]; 2]).is_none());
-    let environment = image(vec![[f32::NAN; 3], [1.0; 3]]).unwrap();
-    let lights = lights(environment);
-    let mut rng = rng(82);
-    for _ in 0..1000 {
-        let sample = lights.sample(Vec3::ZERO, 0.5, pair(&mut rng)).unwrap();
-        assert!(sample.radiance.is_finite() && sample.pdf.is_finite());
-    }
+fn a_black_image_is_no_environment() {
+    assert!(unturned(2, 1, vec![[0.0; 3]; 2]).is_none());
+    let world = description::World::Environment {
+        file: "night.exr".into(),
+        strength: 1.0,
+        color: [1.0; 3],
+        rotation: [0.0; 3],
+    };
+    let black = resolve_world::<()>(&world, |_| Ok(image(2, 1, vec![[0.0; 3]; 2])));
+    let lights = Lights::new(Vec::new(), black.unwrap(), Vec::new());
+    assert!(lights.is_empty());
+    assert_eq!(lights.world(Vec3::ZERO, Vec3::Z), (Vec3::ZERO, 0.0));
 }
 
 #[test]
 fn a_constant_world_is_not_sampled() {
-    let world = World::Constant(Vec3::splat(2.0));
+    let world = description::World::Constant {
+        color: [1.0; 3],
+        strength: 2.0,
+    };
+    let world = resolve_world::<()>(&world, |_| unreachable!()).unwrap();
     let lights = Lights::new(Vec::new(), world, Vec::new());
     assert!(lights.is_empty());
     assert!(lights.sample(Vec3::ZERO, 0.5, [0.5; 2]).is_none());
