@@ -243,7 +243,7 @@ static VECTORS: [[[u32; 4]; 16]; LOG2_SEQUENCE as usize / 4] = {
             let mut value = 0;
             while value < 16 {
                 // The first bit of a reversed index is its highest.
-                if value >> (3 - bit % 4) & 1 == 1 {
+                if (value >> (3 - bit % 4)) & 1 == 1 {
                     sums[bit / 4][value][dimension] ^= vectors[bit].reverse_bits();
                 }
                 value += 1;
@@ -278,10 +278,10 @@ const fn direction_vectors(
         } else if k < degree {
             initial[k] << (31 - k)
         } else {
-            let mut vector = vectors[k - degree] ^ vectors[k - degree] >> degree;
+            let mut vector = vectors[k - degree] ^ (vectors[k - degree] >> degree);
             let mut term = 1;
             while term < degree {
-                if coefficients >> (degree - 1 - term) & 1 == 1 {
+                if (coefficients >> (degree - 1 - term)) & 1 == 1 {
                     vector ^= vectors[k - term];
                 }
                 term += 1;
