@@ -36,8 +36,7 @@ class MeshWriter:
         None when the object has no faces. Objects that share evaluated data
         (instances, linked duplicates) share the file.
         """
-        # Curves, text and metaballs are tessellated per object.
-        key = (ob.data if ob.type == "MESH" else ob.original).as_pointer()
+        key = ob.data.as_pointer()
         if key not in self._by_pointer:
             self._by_pointer[key] = self._write(ob)
         return self._by_pointer[key]
@@ -55,7 +54,8 @@ class MeshWriter:
         digest = hashlib.sha256(text.encode()).digest()
         name = self._by_hash.get(digest)
         if name is None:
-            name = self._by_hash[digest] = unique_name(ob.data.name, self.files)
+            # Evaluated data has names of its own in some versions.
+            name = self._by_hash[digest] = unique_name(ob.original.data.name, self.files)
             self.files[name] = f"{name}.obj"
             with open(os.path.join(self.folder, self.files[name]), "w", encoding="ascii") as f:
                 f.write(text)
