@@ -112,7 +112,7 @@ impl Sampler {
     /// Starts sample number `sample` of `pixel` (column, row, from the top
     /// left of the full image, so that a crop shows the same noise).
     pub fn new(seed: u64, pixel: [u32; 2], sample: u32) -> Self {
-        let pixel = u64::from(pixel[0]) | u64::from(pixel[1]) << 32;
+        let pixel = u64::from(pixel[0]) | (u64::from(pixel[1]) << 32);
         let sequence = u64::from(sample >> LOG2_SEQUENCE);
         Self {
             key: mix(mix(mix(seed) ^ pixel).wrapping_add(sequence)),
@@ -154,7 +154,7 @@ impl Sampler {
             Purpose::Sample => Dimension::bsdf(bounce).set,
             Purpose::Light => Dimension::vertex(bounce, 3, 0).set,
         };
-        let tail_key = self.set_key(set) ^ u64::from(self.index) << 32;
+        let tail_key = self.set_key(set) ^ (u64::from(self.index) << 32);
         WalkStream {
             lead: self.set(set),
             drawn: 0,

@@ -367,6 +367,7 @@ fn without(text: &str, directory: &std::path::Path) -> String {
 #[test]
 fn meshes() {
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let early = format!("{}f 1 2 4\n{TRIANGLE}", "f 1 2 3\n".repeat(30));
     let cases: &[(&str, &[u8])] = &[
         ("empty", b""),
         ("no faces", b"v 0 0 0\nv 1 0 0\n"),
@@ -439,6 +440,10 @@ fn meshes() {
         (
             "several at once",
             b"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 9\nf 1 2 x\nusemtl\nf 1 2 0\n",
+        ),
+        (
+            "an index too far among many that come early",
+            early.as_bytes(),
         ),
         ("scaled by 0", b"v 0 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
     ];
@@ -556,4 +561,57 @@ fn images() {
     )
     .unwrap();
     insta::assert_snapshot!(said);
+}
+
+/// Flips bytes of whole images, from a fixed seed: each is read or refused.
+#[test]
+fn mutated_images_never_panic() {
+    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
+    let directory = directory("mutated-images");
+    let whole = [
+        ("png", encode(Png)),
+        ("jpg", encode(Jpeg)),
+        ("tif", encode(Tiff)),
+        ("hdr", encode(Hdr)),
+        ("exr", encode_exr()),
+    ];
+    let mut rng = rand_pcg::Pcg64Mcg::new(11);
+    let mut below = |n: usize| (rand::Rng::next_u64(&mut rng) % n as u64) as usize;
+    for (extension, bytes) in whole {
+        let path = directory.join(format!("image.{extension}"));
+        let mut refused = 0;
+        for _ in 0..400 {
+            let mut bytes = bytes.clone();
+            for _ in 0..1 + below(3) {
+                // Headers are where most can go wrong.
+                let range = if below(2) == 0 {
+                    bytes.len().min(400)
+                } else {
+                    bytes.len()
+                };
+                bytes[below(range)] = below(256) as u8;
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            let texture = Texture::load(
+                &path,
+                ColorSpace::Srgb,
+                Interpolation::Bilinear,
+                [1.0; 2],
+                [0.0; 2],
+            );
+            match texture {
+                Ok((texture, _)) => assert!(
+                    texture
+                        .sample([0.3, 0.6])
+                        .iter()
+                        .all(|value| value.is_finite())
+                ),
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(
+            (1..400).contains(&refused),
+            "{extension}: {refused} of 400 refused"
+        );
+    }
 }

@@ -456,6 +456,7 @@ fn environments_are_mended_and_counted() {
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| match (at.x(), at.y()) {
         (0, 0) => (f32::NAN, 1.0, f32::INFINITY),
         (1, 0) => (-1.0, 2.0, 3.0),
+        (0, 1) => (0.0, 1.0, 1e30),
         (x, y) => (x as f32, y as f32, 1e4),
     });
     Image::from_channels((2, 2), channels)
@@ -469,12 +470,12 @@ fn environments_are_mended_and_counted() {
         [
             [0.0, 1.0, 0.0],
             [0.0, 2.0, 3.0],
-            [0.0, 1.0, 1e4],
+            [0.0, 1.0, 0.0],
             [1.0, 1.0, 1e4]
         ]
     );
     assert_eq!(
         repairs,
-        [texture::Repair::NonFinite(2), texture::Repair::Negative(1)]
+        [texture::Repair::OutOfRange(3), texture::Repair::Negative(1)]
     );
 }

@@ -121,8 +121,7 @@ def _objects(depsgraph, meshes, materials, log):
     objects, lamps = [], []
     for instance in depsgraph.object_instances:
         ob = instance.object
-        # An instancer that is hidden itself, or a particle emitter.
-        if not (instance.show_particles if instance.is_instance else instance.show_self):
+        if not instance.show_self:  # e.g. an emitter hidden behind its instances
             continue
         where = f'object "{ob.name}"'
         if ob.type == "LIGHT":

@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// In bytes. An image that claims more is broken, or no texture.
 const MAX_MEMORY: u64 = 8 << 30;
+/// Brighter is no light, and decoding or summing it could overflow.
+const MAX_VALUE: f32 = 1e15;
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from all directions.
@@ -100,11 +102,11 @@ pub(super) fn image(path: &Path) -> Result<(Image, Vec<Repair>), TextureError> {
     if let Texels::F32(values) = &mut image.texels {
         let broken = values
             .iter_mut()
-            .filter(|value| !value.is_finite())
+            .filter(|value| value.is_nan() || value.abs() > MAX_VALUE)
             .map(|value| *value = 0.0)
             .count();
         if broken > 0 {
-            repairs.push(Repair::NonFinite(broken));
+            repairs.push(Repair::OutOfRange(broken));
         }
     }
     Ok((image, repairs))
