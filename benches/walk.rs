@@ -161,12 +161,19 @@ fn mean_orders() {
 }
 
 /// Mean over outgoing directions, uniform on the hemispheres that have light,
-/// of the variance of one evaluation; and its time, ns.
-fn variance(surface: &dyn Surface, estimator: Estimator, cos: f32, both_sides: bool) -> (f64, f64) {
+/// of the variance of one evaluation, with its standard error; and the time
+/// of an evaluation, ns. Sharp lobes met by chance make the variance itself
+/// hard to measure: mind the error.
+fn variance(
+    surface: &dyn Surface,
+    estimator: Estimator,
+    cos: f32,
+    both_sides: bool,
+) -> (f64, f64, f64) {
     let wi = Vector3::spherical(cos, 0.3);
     let mut rng = stream(3);
-    let (directions, repeats) = (2_000, 100_u32);
-    let mut sum = 0.0;
+    let (directions, repeats) = (10_000, 100_u32);
+    let (mut sum, mut sum2) = (0.0, 0.0);
     // A batch is much shorter than a slice of the scheduler: the median of
     // their times is blind to other processes on the machine.
     let mut times = Vec::with_capacity(directions);
@@ -186,9 +193,17 @@ fn variance(surface: &dyn Surface, estimator: Estimator, cos: f32, both_sides: b
             squares += delta * (x - mean);
         }
         times.push(start.elapsed().as_nanos() as f64 / f64::from(repeats));
-        sum += squares / f64::from(repeats - 1);
+        let found = squares / f64::from(repeats - 1);
+        sum += found;
+        sum2 += found * found;
     }
-    (sum / directions as f64, median(&mut times))
+    let n = directions as f64;
+    let mean = sum / n;
+    (
+        mean,
+        ((sum2 / n - mean * mean) / n).sqrt(),
+        median(&mut times),
+    )
 }
 
 fn median(times: &mut [f64]) -> f64 {
@@ -198,32 +213,23 @@ fn median(times: &mut [f64]) -> f64 {
 
 fn efficiencies() {
     println!(
-        "variance × (time + 1 µs of a traced ray), walk over estimator, hemisphere mean; ns per evaluation in brackets"
+        "variance × (time + 1 µs of a traced ray), walk over estimator, hemisphere mean ± standard error; ns per evaluation in brackets"
     );
     for (name, conductor, surface) in &surfaces() {
+        let both_sides = name.starts_with("dielectric");
         for cos in COSINES {
-            let (reference, walk_time) = variance(
-                surface.as_ref(),
-                Estimator::Walk,
-                cos,
-                name.starts_with("dielectric"),
-            );
+            let measure = |estimator| variance(surface.as_ref(), estimator, cos, both_sides);
+            let (walk, walk_error, walk_time) = measure(Estimator::Walk);
             print!("{name:32} cosθ {cos:5}  walk [{walk_time:4.0}]");
             let estimators = [
                 ("two-walk", Estimator::TwoWalk),
                 ("position-free", Estimator::PositionFree),
             ];
             for (label, estimator) in estimators.into_iter().take(if *conductor { 2 } else { 1 }) {
-                let (var, time) = variance(
-                    surface.as_ref(),
-                    estimator,
-                    cos,
-                    name.starts_with("dielectric"),
-                );
-                print!(
-                    "  {label} {:6.2} [{time:4.0}]",
-                    reference * (walk_time + 1e3) / (var * (time + 1e3))
-                );
+                let (var, error, time) = measure(estimator);
+                let gain = walk * (walk_time + 1e3) / (var * (time + 1e3));
+                let spread = gain * (walk_error / walk).hypot(error / var);
+                print!("  {label} {gain:6.2} ± {spread:.2} [{time:4.0}]");
             }
             println!();
         }

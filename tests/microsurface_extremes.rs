@@ -46,7 +46,7 @@ const ALPHAS: [(f64, f64); 12] = [
     (1e-3, 1e3),
 ];
 
-const COSINES: [f64; 10] = [
+const COSINES: [f64; 12] = [
     1.0,
     1.0 - 1e-7,
     0.99995,
@@ -56,6 +56,8 @@ const COSINES: [f64; 10] = [
     1e-5,
     1e-8,
     1e-12,
+    1e-29,
+    1e-40,
     0.0,
 ];
 

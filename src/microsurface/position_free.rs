@@ -4,8 +4,7 @@
 //! enters by exponentials only. Its distribution at a facet, given all
 //! directions so far, stays a mixture of sums of exponential variables, on
 //! which descending, climbing and escaping act in closed form. A step costs
-//! time in proportion to the steps down so far: nothing at α ≤ 1, too much at
-//! α ≥ 10.
+//! time in proportion to the steps down so far.
 
 use super::two_walk::kept_inside;
 use super::walk::survives;

@@ -1,6 +1,8 @@
 //! The walk among the micro-facets.
 
-use super::{At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
+use super::{
+    At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3, enters,
+};
 
 /// Weights below this are played against: continuing costs more than it can
 /// bring. From [`ROULETTE_FROM`] on, so that dark surfaces keep a clean first
@@ -138,7 +140,7 @@ impl<N, I> Microsurface<N, I> {
         N: Ndf<F>,
         I: Facets<F>,
     {
-        if !(wi.z > F::zero() && wi.is_finite()) {
+        if !enters(wi) {
             return None;
         }
         if let Some(tint) = self.facets.invisible() {
