@@ -64,11 +64,13 @@ impl<F: Real> Depth<F> {
             passing = here * (stage.rate * split);
             collided += stage.start;
         }
-        if collided > F::zero() {
-            let norm = collided.recip();
-            for stage in &mut self.stages {
-                stage.start *= norm;
-            }
+        // A chance without a finite reciprocal never comes true.
+        if collided < F::min_positive_value() {
+            return F::zero();
+        }
+        let norm = collided.recip();
+        for stage in &mut self.stages {
+            stage.start *= norm;
         }
         collided
     }
