@@ -1,1 +1,3 @@
 //! (see the crate's front page)
+
+pub mod heightfield;
