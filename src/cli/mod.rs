@@ -6,6 +6,7 @@ mod furnace;
 mod info;
 mod render;
 mod scene;
+mod validate;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -31,6 +32,8 @@ enum Command {
     Diff(diff::Args),
     /// White furnace: what share of the light each material gives back
     Furnace(furnace::Args),
+    /// Test the microsurface model against what must hold for it
+    Validate(validate::Args),
     /// Measure a material
     #[command(subcommand)]
     Bsdf(bsdf::Command),
@@ -44,6 +47,7 @@ impl Cli {
             Command::Info(args) => info::run(args, out, log),
             Command::Diff(args) => diff::run(args, out),
             Command::Furnace(args) => furnace::run(args, out, log),
+            Command::Validate(args) => validate::run(args, out, log),
             Command::Bsdf(command) => bsdf::run(command, out),
         }
     }

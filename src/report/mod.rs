@@ -1,3 +1,5 @@
-//! (see the crate's front page)
+//! Reports: the model's statements with figures, and the surface it stands for.
 
 pub mod heightfield;
+pub mod plot;
+pub mod validate;

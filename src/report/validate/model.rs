@@ -1,0 +1,168 @@
+//! What is validated: the model's parts, each replaceable by a faulty one.
+
+use crate::microsurface::{
+    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Estimator, Exit, Facets, Ggx,
+    Microsurface, Ndf, Quadratic, Rgb, Stream, Tally, Vector3,
+};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+/// The random numbers of a check.
+pub type Rng = Stream<Pcg64Mcg>;
+
+/// The random numbers of case `index` of the check `check`: fixed, so that a
+/// verdict can be repeated, and independent of the order of the cases.
+pub fn stream(check: u64, index: usize) -> Rng {
+    Stream(Pcg64Mcg::seed_from_u64(check << 32 | index as u64))
+}
+
+/// A number in [0, 1).
+pub fn uniform(rng: &mut Rng) -> f64 {
+    rng.draw()
+}
+
+/// A distribution of normals of the grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Distribution {
+    /// Trowbridge–Reitz.
+    Ggx(Ggx<f64>),
+    /// Gaussian slopes.
+    Beckmann(Beckmann<f64>),
+    /// The one with closed-form mirrors.
+    Quadratic,
+}
+
+impl Distribution {
+    /// The slope roughness α along x and y; that of slopes ∼ 1 for the
+    /// quadratic distribution.
+    pub fn alpha(self) -> (f64, f64) {
+        match self {
+            Self::Ggx(d) => (d.alpha_x, d.alpha_y),
+            Self::Beckmann(d) => (d.alpha_x, d.alpha_y),
+            Self::Quadratic => (1.0, 1.0),
+        }
+    }
+
+    /// Its name and roughness.
+    pub fn name(self) -> String {
+        let name = match self {
+            Self::Ggx(_) => "GGX",
+            Self::Beckmann(_) => "Beckmann",
+            Self::Quadratic => return "quadratic".into(),
+        };
+        let (x, y) = self.alpha();
+        if x == y {
+            format!("{name} α {x}")
+        } else {
+            format!("{name} α {x}, {y}")
+        }
+    }
+}
+
+impl Ndf<f64> for Distribution {
+    fn density(&self, m: Vector3<f64>) -> f64 {
+        match self {
+            Self::Ggx(d) => d.density(m),
+            Self::Beckmann(d) => d.density(m),
+            Self::Quadratic => Quadratic.density(m),
+        }
+    }
+
+    fn projected_area(&self, w: Vector3<f64>) -> f64 {
+        match self {
+            Self::Ggx(d) => d.projected_area(w),
+            Self::Beckmann(d) => d.projected_area(w),
+            Self::Quadratic => Quadratic.projected_area(w),
+        }
+    }
+
+    fn sample_visible(&self, w: Vector3<f64>, u: [f64; 2]) -> Vector3<f64> {
+        match self {
+            Self::Ggx(d) => d.sample_visible(w, u),
+            Self::Beckmann(d) => d.sample_visible(w, u),
+            Self::Quadratic => Quadratic.sample_visible(w, u),
+        }
+    }
+}
+
+/// An implementation of the microsurface model. [`Smithwalk`] is the crate's;
+/// tests give others, with a part that is wrong, to see it found.
+pub trait Model: Copy + Send + Sync {
+    /// Its distributions of normals.
+    type Ndf: Ndf<f64> + Send + Sync;
+    /// Its mirrors.
+    type Conductor: Facets<f64> + Send + Sync;
+    /// Its dielectric facets.
+    type Dielectric: Facets<f64> + Send + Sync;
+    /// Its Lambertian facets.
+    type Diffuse: Facets<f64> + Send + Sync;
+
+    /// The distribution `d`.
+    fn ndf(self, d: Distribution) -> Self::Ndf;
+
+    /// Mirrors that absorb nothing.
+    fn conductor(self) -> Self::Conductor;
+
+    /// Clear facets with the relative index n(below)/n(above) = `eta`.
+    fn dielectric(self, eta: f64) -> Self::Dielectric;
+
+    /// Lambertian facets that absorb nothing.
+    fn diffuse(self) -> Self::Diffuse;
+
+    /// One walk, as [`Microsurface::sample`].
+    fn sample<I: Facets<f64>>(
+        self,
+        surface: &Microsurface<Self::Ndf, I>,
+        wi: Vector3<f64>,
+        rng: &mut impl Draw<f64>,
+    ) -> Option<Exit<f64>> {
+        surface.sample(wi, rng)
+    }
+
+    /// One estimate, as [`Microsurface::eval`].
+    fn eval<I: Facets<f64>>(
+        self,
+        surface: &Microsurface<Self::Ndf, I>,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut impl Draw<f64>,
+        tally: &mut impl Tally<f64>,
+    ) {
+        surface.eval(estimator, wi, wo, rng, tally);
+    }
+}
+
+/// The model of this crate.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Smithwalk;
+
+impl Model for Smithwalk {
+    type Ndf = Distribution;
+    type Conductor = Conductor<f64>;
+    type Dielectric = Dielectric<f64>;
+    type Diffuse = Diffuse<f64>;
+
+    fn ndf(self, d: Distribution) -> Distribution {
+        d
+    }
+
+    fn conductor(self) -> Conductor<f64> {
+        Conductor {
+            fresnel: ConductorFresnel::Constant(Rgb::white()),
+        }
+    }
+
+    fn dielectric(self, eta: f64) -> Dielectric<f64> {
+        Dielectric {
+            eta,
+            tint: Rgb::white(),
+        }
+    }
+
+    fn diffuse(self) -> Diffuse<f64> {
+        Diffuse {
+            albedo: Rgb::white(),
+        }
+    }
+}
