@@ -12,7 +12,10 @@ means of each seed.
 Cycles 3.4's Multiscatter GGX evaluates to less than it samples: gold of
 roughness 0.8 under the area light of the gold_sphere scene is 12 % darker in
 green than when the same light is found by BSDF sampling alone. With
---no-light-sampling all light is found that way: noisier, but one model.
+--no-light-sampling all light is found that way: noisier, but one model. That
+helps pure materials only: in a mix, sampling one closure evaluates the other
+(tiles that mix 30 % of it come out 1.2 % brighter than the weighted sum of
+the two materials).
 """
 
 import argparse
