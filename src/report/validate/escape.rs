@@ -30,7 +30,7 @@ fn lambda(model: impl Model, d: Distribution, w: Vector3<f64>) -> f64 {
 /// The mean of e^{−Λ τ} over the heights, with τ(h) = ∫_h^∞ P1/C1 dh′ summed
 /// up from the top: the chance of no hit at the rate Λ P1/C1 per height.
 fn escapes(heights: &impl Heights<f64>, (low, high): (f64, f64), lambda: f64) -> f64 {
-    const STEPS: usize = 20_000;
+    const STEPS: usize = 4_000;
     // Short steps at the top, where steep rates are decided, and at the
     // bottom, where the rate of uniform heights has a pole.
     let height = |i: usize| {

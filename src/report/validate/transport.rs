@@ -5,7 +5,9 @@ use super::check::{Case, Check, Statement};
 use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream, uniform};
 use super::statistics::Mean;
-use crate::microsurface::{Estimator, Facets, Ggx, Microsurface, Ndf, Split, Total, Vector3};
+use crate::microsurface::{
+    Estimator, Facets, Ggx, Microsurface, Ndf, Rgb, Split, Tally, Total, Vector3,
+};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -132,8 +134,23 @@ fn albedo<M: Model, I: Facets<f64>>(
     (single, total)
 }
 
-/// What walks carry out in zones of the sphere, against what is evaluated in
-/// them, single and multiple scattering apart.
+/// Orders 1, 2, and all above, in the first channel.
+#[derive(Default)]
+struct ByOrder([f64; 3]);
+
+/// Where an order is in [`ByOrder`].
+fn class(order: u32) -> usize {
+    (order.max(1) as usize - 1).min(2)
+}
+
+impl Tally<f64> for ByOrder {
+    fn add(&mut self, order: u32, value: Rgb<f64>) {
+        self.0[class(order)] += value.0[0];
+    }
+}
+
+/// What walks carry out in zones of the sphere by order, against what is
+/// evaluated in them.
 fn zones<M: Model, I: Facets<f64>>(
     model: M,
     proposal: &Proposal<M::Ndf, I>,
@@ -143,42 +160,35 @@ fn zones<M: Model, I: Facets<f64>>(
     rng: &mut Rng,
 ) -> Vec<Case> {
     const EDGES: [f64; 5] = [-1.0, -0.5, 0.0, 0.4, 1.0];
-    let mut exits = [[Mean::default(); 2]; 4];
+    let zone = |z: f64| EDGES[1..4].iter().filter(|&&edge| z > edge).count();
+    let mut exits = [[Mean::default(); 3]; 4];
     let mut values = exits;
     for _ in 0..samples {
-        let exit = model.sample(&proposal.surface, wi, rng);
-        let mut split = Split::default();
-        let (mut z, mut density) = (f64::NAN, 1.0);
-        if let Some((wo, p)) = proposal.pick(wi, rng) {
-            model.eval(
-                &proposal.surface,
-                Estimator::TwoWalk,
-                wi,
-                wo,
-                rng,
-                &mut split,
-            );
-            (z, density) = (wo.z, p);
+        let mut left = [[0.0; 3]; 4];
+        if let Some(exit) = model.sample(&proposal.surface, wi, rng) {
+            left[zone(exit.direction.z)][class(exit.order)] = exit.weight.0[0];
+        }
+        let mut evaluated = [[0.0; 3]; 4];
+        if let Some((wo, density)) = proposal.pick(wi, rng) {
+            let mut orders = ByOrder::default();
+            let estimator = Estimator::TwoWalk;
+            model.eval(&proposal.surface, estimator, wi, wo, rng, &mut orders);
+            evaluated[zone(wo.z)] = orders.0.map(|value| value / density);
         }
         for k in 0..4 {
-            let inside = |z: f64| z > EDGES[k] && z <= EDGES[k + 1];
-            for (multiple, value) in [split.single, split.multiple].into_iter().enumerate() {
-                let left =
-                    exit.filter(|e| inside(e.direction.z) && usize::from(e.order > 1) == multiple);
-                exits[k][multiple].add(left.map_or(0.0, |e| e.weight.0[0]));
-                let value = value.0[0] / density;
-                values[k][multiple].add(if inside(z) { value } else { 0.0 });
+            for order in 0..3 {
+                exits[k][order].add(left[k][order]);
+                values[k][order].add(evaluated[k][order]);
             }
         }
     }
     let mut cases = Vec::new();
     for k in 0..4 {
-        for multiple in 0..2 {
-            let (exit, value) = (&exits[k][multiple], &values[k][multiple]);
+        for (order, kind) in ["1", "2", "≥ 3"].into_iter().enumerate() {
+            let (exit, value) = (&exits[k][order], &values[k][order]);
             // A share of a few samples is not normally distributed.
             if exit.mean.max(value.mean) * samples as f64 > 100.0 {
-                let kind = ["single", "multiple"][multiple];
-                let name = format!("{name}, z ≤ {}, {kind}", EDGES[k + 1]);
+                let name = format!("{name}, z ≤ {}, order {kind}", EDGES[k + 1]);
                 cases.push(Case::new(name, exit.score_against(value)));
             }
         }
@@ -188,7 +198,7 @@ fn zones<M: Model, I: Facets<f64>>(
 
 /// Statement 6.
 pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotError> {
-    let samples = effort.pick(2_000, 16_000);
+    let samples = effort.pick(4_000, 16_000);
     let all: Vec<_> = effort.views_of_all().into_iter().enumerate().collect();
     let energy = each_facets!(model, effort, |name, facets| {
         let tame = all.par_iter().filter(|(_, (d, w))| tame(*d, *w, &facets));
@@ -266,7 +276,7 @@ pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, Pl
             Check::scores("the integral, by every estimator", energy),
             Check::scores("what walks carry out", kept),
             Check::scores(
-                "what walks carry out into zones, against what is evaluated there",
+                "what walks carry out by zone and order, against what is evaluated there",
                 carried,
             ),
         ],
@@ -405,7 +415,7 @@ pub fn reciprocal<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotE
     let balanced = balanced.collect();
     // Values for fixed directions, by the walk from one end and the two-walk
     // estimators, which weight by what reciprocity says of the other end.
-    let samples = effort.pick(10_000, 40_000);
+    let samples = effort.pick(5_000, 40_000);
     let pairs = [(0.9, 0.3), (0.2, 0.6), (0.5, 0.5), (0.8, -0.4), (0.4, -0.7)];
     let pairs = pairs.map(|(a, b)| (Vector3::spherical(a, 0.2), Vector3::spherical(b, 2.5)));
     let estimates = each_facets!(model, effort, |name, facets| {
