@@ -1,6 +1,7 @@
 //! The subcommands, one file each.
 
 mod bsdf;
+mod converge;
 mod diff;
 mod furnace;
 mod info;
@@ -29,6 +30,8 @@ enum Command {
     Info(info::Args),
     /// Compare two images
     Diff(diff::Args),
+    /// Measure the error against samples and time, for several estimators
+    Converge(converge::Args),
     /// White furnace: what share of the light each material gives back
     Furnace(furnace::Args),
     /// Measure a material
@@ -43,6 +46,7 @@ impl Cli {
             Command::Render(args) => render::run(args, out, log),
             Command::Info(args) => info::run(args, out, log),
             Command::Diff(args) => diff::run(args, out),
+            Command::Converge(args) => converge::run(args, out, log),
             Command::Furnace(args) => furnace::run(args, out, log),
             Command::Bsdf(command) => bsdf::run(command, out),
         }

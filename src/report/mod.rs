@@ -1,3 +1,5 @@
-//! (see the crate's front page)
+//! Reports: what was measured, as tables, figures and pages.
 
+pub mod converge;
 pub mod heightfield;
+pub mod plot;
