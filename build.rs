@@ -5,8 +5,8 @@
 //! the library on systems that package only Embree 3), the system's own
 //! library folders.
 
+use std::env;
 use std::path::{Path, PathBuf};
-use std::{env, fs, io};
 
 const LIBRARY: &str = "libembree4.so";
 
@@ -33,7 +33,7 @@ fn main() {
     } else if let Some(found) = holder([manifest.join(".deps/embree/lib")]) {
         link_from(&found);
     } else if let Some(found) = holder(system_folders(&multiarch)) {
-        // The loader knows the way: neither a run path nor a copy is needed.
+        // The loader knows the way: no run path is needed.
         watch(&found);
         println!("cargo:rustc-link-search=native={}", found.display());
     } else {
@@ -62,43 +62,15 @@ fn watch(folder: &Path) {
 }
 
 /// Links from `folder`, which the loader does not search, and makes programs
-/// find the library there again.
+/// find the library there again: the run path goes into all that this package
+/// links, documentation tests included.
 fn link_from(folder: &Path) {
     let folder = folder
         .canonicalize()
         .unwrap_or_else(|why| fail(&format!("`{}` can't be read: {why}", folder.display())));
     watch(&folder);
-    // For what this package links: the program, tests, examples and benches.
+    println!("cargo:rustc-link-search=native={}", folder.display());
     println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
-    // Documentation tests get no link arguments. But Cargo runs them, as all
-    // tests, with those search folders in the loader's path that lie within
-    // the target folder: show them the library there.
-    let out = PathBuf::from(env::var_os("OUT_DIR").expect("set by cargo"));
-    if let Err(why) = mirror(&folder, &out) {
-        fail(&format!(
-            "can't link the files of `{}` into `{}`: {why}",
-            folder.display(),
-            out.display()
-        ));
-    }
-    println!("cargo:rustc-link-search=native={}", out.display());
-}
-
-/// Makes symbolic links in `out` to Embree and to the TBB that may lie beside
-/// it. Embree looks for TBB in the folder it was found in, so both are needed.
-fn mirror(folder: &Path, out: &Path) -> io::Result<()> {
-    for entry in fs::read_dir(out)? {
-        fs::remove_file(entry?.path())?;
-    }
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        let shown = name.to_string_lossy();
-        if shown.starts_with("libembree4") || shown.starts_with("libtbb") {
-            std::os::unix::fs::symlink(entry.path(), out.join(&name))?;
-        }
-    }
-    Ok(())
 }
 
 fn fail(why: &str) -> ! {

@@ -8,6 +8,5 @@ PATH=$PATH:${HOME:-/root}/.cargo/bin
 ./setup.sh
 cargo build --release --locked
 mkdir -p out
-target/release/smithwalk render scenes/suzanne/suzanne.yaml -o out/suzanne.exr -o out/suzanne.png \
-    -D film.width=960 -D film.height=540 --spp 64
+target/release/smithwalk render scenes/suzanne/scene.yaml --spp 48 -o out/suzanne.exr -o out/suzanne.png
 printf '%s\n' "$PWD/out/suzanne.png"

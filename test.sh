@@ -18,14 +18,9 @@ results=$(mktemp)
 trap 'rm -f "$results"' EXIT
 documentation() { RUSTDOCFLAGS='-D warnings' cargo doc --no-deps; }
 tests() { cargo test --no-fail-fast 2>&1 | tee "$results"; }
-shell_syntax() {
-    local script bad=0
-    for script in *.sh .ci/run; do
-        bash -n "$script" || bad=1
-    done
-    return $bad
-}
-python_syntax() { PYTHONPYCACHEPREFIX=target/pycache python3 -m py_compile blender/*.py; }
+scripts() { find . \( -path ./target -o -path ./.deps -o -path ./.git \) -prune -o "$@" -print0; }
+shell_syntax() { scripts -name '*.sh' | xargs -0 -n 1 bash -n && bash -n .ci/run; }
+python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
 
 stage set-up ./setup.sh --with-lints --with-blender
 [[ ${#failed[@]} -eq 0 ]] || exit 1

@@ -38,6 +38,8 @@ gold_sphere() {
     build gold_sphere
     for r in 0.5 0.8; do
         cycles34 gold_sphere "multi_ggx_r$r" --distribution MULTI_GGX --roughness $r --spp 512 --seeds 5 --seed 1
+        cycles34 gold_sphere "multi_ggx_bsdf_sampling_r$r" --distribution MULTI_GGX --roughness $r \
+            --no-light-sampling --percent 25 --spp 4096 --seeds 4 --seed 1
         cycles45 gold_sphere "ggx_r$r" --distribution GGX --roughness $r --spp 512 --seeds 3 --seed 1
     done
 }
@@ -45,11 +47,23 @@ gold_sphere() {
 suzanne() {
     build suzanne
     cycles34 suzanne multi_ggx --percent 50 --spp 256 --seeds 3 --seed 1
-    cycles45 suzanne ggx --percent 50 --distribution GGX --spp 256 --seeds 2 --seed 1
+    cycles45 suzanne ggx --percent 50 --distribution GGX --spp 128 --seeds 2 --seed 1
+}
+
+sphere_rows() {
+    build sphere_rows
+    cycles34 sphere_rows multi_ggx --percent 50 --spp 128 --seeds 3 --seed 1
+    cycles45 sphere_rows ggx --percent 50 --distribution GGX --spp 128 --seeds 2 --seed 1
+}
+
+furnace() {
+    build furnace
+    cycles34 furnace multi_ggx --spp 64 --seed 1
+    cycles45 furnace multi_ggx --spp 64 --seed 1
 }
 
 if [ $# -eq 0 ]; then
-    set -- gold_sphere suzanne
+    set -- gold_sphere suzanne sphere_rows furnace
 fi
 for scene; do
     "$scene"

@@ -237,15 +237,18 @@ fn values_out_of_range() {
 
 #[test]
 fn names_that_nothing_has() {
-    let chain = (0..70).fold(
-        "materials:\n  m70: {diffuse: {}}\n".to_owned(),
-        |text, i| {
-            format!(
-                "{text}  m{i}: {{mix: {{a: m{}, b: {{diffuse: {{}}}}}}}}\n",
-                i + 1
-            )
-        },
-    );
+    let leaf = "materials:\n  leaf: {diffuse: {}}\n  m069: {mix: {a: leaf, b: leaf}}\n".to_owned();
+    let chain = (0..69).fold(leaf.clone(), |text, i| {
+        format!("{text}  m{i:03}: {{mix: {{a: m{:03}, b: leaf}}}}\n", i + 1)
+    });
+    // Names sorted the other way round: each finds the next one done.
+    let reversed = (0..69).fold(leaf, |text, i| {
+        format!(
+            "{text}  m{:03}: {{mix: {{a: m{:03}, b: leaf}}}}\n",
+            138 - i,
+            if i == 68 { 69 } else { 137 - i }
+        )
+    });
     insta::assert_snapshot!(scenes(&[
         (
             "a mesh",
@@ -272,6 +275,7 @@ fn names_that_nothing_has() {
             "materials: {m: {mix: {a: n, b: {diffuse: {}}}}, n: {mix: {a: {diffuse: {}}, b: {mix: {a: m, b: m}}}}}"
         ),
         ("mixes without end", &chain),
+        ("mixes without end, last first", &reversed),
         (
             "the name of something faulty is not blamed",
             "meshes: {a: {file: a.obj}}\nmaterials: {gold: {conductor: {roughnes: 1, alpha: x}}}\nobjects: [{mesh: a, material: gold}]",
@@ -367,6 +371,7 @@ fn without(text: &str, directory: &std::path::Path) -> String {
 #[test]
 fn meshes() {
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let early = format!("{}f 1 2 4\n{TRIANGLE}", "f 1 2 3\n".repeat(30));
     let cases: &[(&str, &[u8])] = &[
         ("empty", b""),
         ("no faces", b"v 0 0 0\nv 1 0 0\n"),
@@ -439,6 +444,10 @@ fn meshes() {
         (
             "several at once",
             b"v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 9\nf 1 2 x\nusemtl\nf 1 2 0\n",
+        ),
+        (
+            "an index too far among many that come early",
+            early.as_bytes(),
         ),
         ("scaled by 0", b"v 0 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
     ];
@@ -556,4 +565,57 @@ fn images() {
     )
     .unwrap();
     insta::assert_snapshot!(said);
+}
+
+/// Flips bytes of whole images, from a fixed seed: each is read or refused.
+#[test]
+fn mutated_images_never_panic() {
+    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
+    let directory = directory("mutated-images");
+    let whole = [
+        ("png", encode(Png)),
+        ("jpg", encode(Jpeg)),
+        ("tif", encode(Tiff)),
+        ("hdr", encode(Hdr)),
+        ("exr", encode_exr()),
+    ];
+    let mut rng = rand_pcg::Pcg64Mcg::new(11);
+    let mut below = |n: usize| (rand::Rng::next_u64(&mut rng) % n as u64) as usize;
+    for (extension, bytes) in whole {
+        let path = directory.join(format!("image.{extension}"));
+        let mut refused = 0;
+        for _ in 0..400 {
+            let mut bytes = bytes.clone();
+            for _ in 0..1 + below(3) {
+                // Headers are where most can go wrong.
+                let range = if below(2) == 0 {
+                    bytes.len().min(400)
+                } else {
+                    bytes.len()
+                };
+                bytes[below(range)] = below(256) as u8;
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            let texture = Texture::load(
+                &path,
+                ColorSpace::Srgb,
+                Interpolation::Bilinear,
+                [1.0; 2],
+                [0.0; 2],
+            );
+            match texture {
+                Ok((texture, _)) => assert!(
+                    texture
+                        .sample([0.3, 0.6])
+                        .iter()
+                        .all(|value| value.is_finite())
+                ),
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(
+            (1..400).contains(&refused),
+            "{extension}: {refused} of 400 refused"
+        );
+    }
 }

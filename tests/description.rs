@@ -385,6 +385,32 @@ fn paths_start_from_the_scene_file() {
     );
 }
 
+#[test]
+fn the_scenes_of_the_repository_are_sound() {
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let files = std::fs::read_dir(&scenes).unwrap().flat_map(|entry| {
+        let path = entry.unwrap().path();
+        std::fs::read_dir(path)
+            .into_iter()
+            .flatten()
+            .map(|entry| entry.unwrap().path())
+    });
+    let mut count = 0;
+    for path in files.filter(|path| {
+        path.extension()
+            .is_some_and(|extension| extension == "yaml")
+    }) {
+        let scene = Description::load(&path, &[]).unwrap_or_else(|problems| panic!("{problems}"));
+        for mesh in scene.meshes.values() {
+            let file = scene.resolve_path(&mesh.file);
+            smithwalk::mesh::Mesh::load(&file, smithwalk::mesh::Wanted::ALL)
+                .unwrap_or_else(|error| panic!("{error}"));
+        }
+        count += 1;
+    }
+    assert!(count > 0, "no scenes in {}", scenes.display());
+}
+
 /// What mutations put in place of something else.
 const FRAGMENTS: [&str; 18] = [
     "",

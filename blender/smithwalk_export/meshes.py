@@ -36,8 +36,7 @@ class MeshWriter:
         None when the object has no faces. Objects that share evaluated data
         (instances, linked duplicates) share the file.
         """
-        # Curves, text and metaballs are tessellated per object.
-        key = (ob.data if ob.type == "MESH" else ob.original).as_pointer()
+        key = ob.data.as_pointer()
         if key not in self._by_pointer:
             self._by_pointer[key] = self._write(ob)
         return self._by_pointer[key]
@@ -55,7 +54,8 @@ class MeshWriter:
         digest = hashlib.sha256(text.encode()).digest()
         name = self._by_hash.get(digest)
         if name is None:
-            name = self._by_hash[digest] = unique_name(ob.data.name, self.files)
+            # Evaluated data has names of its own in some versions.
+            name = self._by_hash[digest] = unique_name(ob.original.data.name, self.files)
             self.files[name] = f"{name}.obj"
             with open(os.path.join(self.folder, self.files[name]), "w", encoding="ascii") as f:
                 f.write(text)
@@ -98,14 +98,14 @@ def obj_text(mesh):
     """The OBJ of a mesh, and the sorted material slots its faces use.
 
     Faces of slot n stand under `usemtl slot_n` when more than one is used.
-    Positions keep seven significant digits of the largest coordinate,
-    normals and UVs six decimals.
+    Positions keep seven significant digits of the largest coordinate, normals
+    five decimals (Blender's sixth depends on its threads), UVs six.
     """
     largest = max((abs(c) for v in mesh.vertices for c in v.co), default=0.0)
     if not math.isfinite(largest):
         raise ValueError(f'mesh "{mesh.name}" has a vertex that is not finite')
     digits = 6 if largest == 0.0 else max(0, 6 - math.floor(math.log10(largest)))
-    positions, normals, uvs = Pool("v", digits), Pool("vn", 6), Pool("vt", 6)
+    positions, normals, uvs = Pool("v", digits), Pool("vn", 5), Pool("vt", 6)
 
     normal_of = corner_normals(mesh)
     uv_layer = next((l for l in mesh.uv_layers if l.active_render), None)

@@ -16,9 +16,9 @@ from .materials import MaterialWriter
 from .meshes import MeshWriter
 
 FORMAT_VERSION = 1
-# What turns into triangles; metaballs do so through the family's first ball.
-_SURFACES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
-_SILENT = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
+# Curves, text and metaballs come with an instance of type MESH, their tessellation.
+_SILENT = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE",
+           "CURVE", "SURFACE", "FONT", "META"}
 
 
 class ExportError(Exception):
@@ -121,15 +121,14 @@ def _objects(depsgraph, meshes, materials, log):
     objects, lamps = [], []
     for instance in depsgraph.object_instances:
         ob = instance.object
-        # An instancer that is hidden itself, or a particle emitter.
-        if not (instance.show_particles if instance.is_instance else instance.show_self):
+        if not instance.show_self:  # e.g. an emitter hidden behind its instances
             continue
         where = f'object "{ob.name}"'
         if ob.type == "LIGHT":
             lamp = lights.light(ob, instance.matrix_world.copy(), log)
             if lamp:
                 lamps.append(lamp)
-        elif ob.type in _SURFACES:
+        elif ob.type == "MESH":
             # The iterator reuses the instance: copy before going on.
             entry = _object(ob, instance.matrix_world.copy(), meshes, materials, log, where)
             if entry:
@@ -169,7 +168,7 @@ def _object(ob, world_matrix, meshes, materials, log, where):
 def _slot_material(ob, index):
     """The material of a slot: the object's own if the slot is linked to it, else the mesh's."""
     slots = ob.material_slots
-    if index < len(slots) and (slots[index].link == "OBJECT" or ob.type != "MESH"):
+    if index < len(slots) and slots[index].link == "OBJECT":
         return slots[index].material
     mesh_materials = ob.data.materials
     return mesh_materials[index] if index < len(mesh_materials) else None
@@ -177,11 +176,10 @@ def _slot_material(ob, index):
 
 def _check_coordinates(ob, names, materials, log, where):
     """Name where UVs or tangents of this object differ from Blender's."""
-    if ob.type == "MESH":
-        active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
-        wanted = set().union(*(materials.uv_maps[n] for n in names))
-        for name in sorted(wanted - {active}):
-            log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
+    active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
+    wanted = set().union(*(materials.uv_maps[n] for n in names))
+    for name in sorted(wanted - {active}):
+        log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
     # Blender's radial tangents turn about the middle of the bounding box, in
     # coordinates scaled by it; the renderer's turn about the object's axis.
     corners = [tuple(c) for c in ob.bound_box]

@@ -68,8 +68,7 @@ impl Closure {
     /// direction with a finite, non-negative, non-zero weight.
     #[inline]
     pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
-        // Written so that NaN is refused too.
-        if !(wo.z > MIN_COS) {
+        if wo.z.is_nan() || wo.z <= MIN_COS {
             return None;
         }
         let sample = each_rough!(self, rough => rough.sample(wo, rng)?,

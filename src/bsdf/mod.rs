@@ -20,6 +20,7 @@
 //! and it is how Cycles does it.
 
 mod closure;
+mod compensation;
 mod frame;
 mod interface;
 mod lambert;
@@ -28,6 +29,7 @@ mod mirror;
 mod rough;
 
 pub use closure::Closure;
+pub use compensation::{Albedos, MeanWeight, Normals, WhiteFacets, Width};
 pub use frame::Frame;
 pub use interface::Interface;
 pub use lambert::Lambert;

@@ -225,11 +225,10 @@ fn write_table(
 }
 
 fn write_z(z: &ZTest, out: &mut dyn Write) -> std::io::Result<()> {
-    let rate = 100.0 * FALSE_ALARM_RATE;
+    let runs = 1.0 / FALSE_ALARM_RATE;
     writeln!(
         out,
-        "\nIs it noise? Each bound is passed by chance once in {:.0} runs ({rate} %).",
-        1.0 / FALSE_ALARM_RATE
+        "\nIs it noise? Chance passes each bound in at most 1 of {runs:.0} runs."
     )?;
     writeln!(
         out,

@@ -1,6 +1,7 @@
 //! The subcommands, one file each.
 
 mod bsdf;
+mod converge;
 mod diff;
 mod furnace;
 mod info;
@@ -30,6 +31,8 @@ enum Command {
     Info(info::Args),
     /// Compare two images
     Diff(diff::Args),
+    /// Measure the error against samples and time, for several estimators
+    Converge(converge::Args),
     /// White furnace: what share of the light each material gives back
     Furnace(furnace::Args),
     /// Test the microsurface model against what must hold for it
@@ -46,6 +49,7 @@ impl Cli {
             Command::Render(args) => render::run(args, out, log),
             Command::Info(args) => info::run(args, out, log),
             Command::Diff(args) => diff::run(args, out),
+            Command::Converge(args) => converge::run(args, out, log),
             Command::Furnace(args) => furnace::run(args, out, log),
             Command::Validate(args) => validate::run(args, out, log),
             Command::Bsdf(command) => bsdf::run(command, out),

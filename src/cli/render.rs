@@ -85,7 +85,7 @@ impl From<EstimatorName> for Estimator {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("expected a number greater than zero".to_owned()),
@@ -262,7 +262,7 @@ fn aovs(description: &Description) -> AovSet {
     description.film.aovs.iter().map(aov).collect()
 }
 
-fn pixel_filter(filter: Filter) -> PixelFilter {
+pub fn pixel_filter(filter: Filter) -> PixelFilter {
     match filter {
         Filter::Box {} => PixelFilter::box_filter(),
         Filter::BlackmanHarris { width } => PixelFilter::blackman_harris(width),

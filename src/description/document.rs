@@ -169,7 +169,7 @@ struct Open {
     anchor: usize,
     /// The key whose value comes next.
     key: Option<Key>,
-    /// Whether the next node is the value of a repeated key.
+    /// Whether the next node is the value of a key that makes no sense.
     drop_next: bool,
 }
 
@@ -261,7 +261,10 @@ impl Reader {
         let tag = match &event {
             Event::Scalar(.., Some(tag))
             | Event::SequenceStart(_, Some(tag))
-            | Event::MappingStart(_, Some(tag)) => Some(tag.to_string()),
+            | Event::MappingStart(_, Some(tag)) => Some(match tag.is_yaml_core_schema() {
+                true => format!("!!{}", tag.suffix),
+                false => tag.to_string(),
+            }),
             _ => None,
         };
         if let Some(tag) = tag {
@@ -274,8 +277,17 @@ impl Reader {
         }
         match event {
             Event::Scalar(text, style, anchor, _) => {
-                let node = Node::new(Kind::Scalar(scalar(&text, style)), place);
-                self.report_non_finite(&node, &text, sources);
+                let mut node = Node::new(Kind::Scalar(scalar(&text, style)), place);
+                if let Kind::Scalar(Value::Number(number)) = &node.kind {
+                    if !number
+                        .as_f64()
+                        .is_some_and(|number| (number as f32).is_finite())
+                    {
+                        let message = format!("expected a finite number, found `{text}`");
+                        sources.report(place, self.path(), message, None);
+                        node.pruned = true;
+                    }
+                }
                 self.add(node, anchor, Some(text.into_owned()), sources);
             }
             Event::SequenceStart(anchor, _) => {
@@ -365,45 +377,28 @@ impl Reader {
                 Some(_) if open.drop_next => {}
                 Some(key) => entries.push((key, node)),
                 None => {
-                    let name = text.unwrap_or_else(|| {
-                        sources.report(
-                            node.place,
-                            path,
-                            "expected a name as key, found a collection".into(),
-                            None,
-                        );
-                        String::new()
-                    });
                     let first = entries
                         .iter()
-                        .find(|(key, _)| key.name == name)
-                        .map(|(key, _)| key.place.line);
-                    if let Some(line) = first {
-                        let message =
-                            format!("the key `{name}` is given twice, first in line {line}");
-                        sources.report(node.place, String::new(), message, None);
+                        .find(|(key, _)| Some(&key.name) == text.as_ref());
+                    let fault = match (&text, first) {
+                        (None, _) => Some("expected a name as key, found a collection".to_owned()),
+                        (Some(name), Some((key, _))) => Some(format!(
+                            "the key `{name}` is given twice, first in line {}",
+                            key.place.line
+                        )),
+                        (Some(_), None) => None,
+                    };
+                    open.drop_next = fault.is_some();
+                    if let Some(fault) = fault {
+                        sources.report(node.place, path, fault, None);
                     }
-                    open.drop_next = first.is_some();
                     open.key = Some(Key {
-                        name,
+                        name: text.unwrap_or_default(),
                         place: node.place,
                     });
                 }
             },
             Kind::Scalar(_) => unreachable!("scalars are never open"),
-        }
-    }
-
-    fn report_non_finite(&self, node: &Node, text: &str, sources: &mut Sources) {
-        let Kind::Scalar(Value::Number(number)) = &node.kind else {
-            return;
-        };
-        let finite = number
-            .as_f64()
-            .is_some_and(|number| (number as f32).is_finite());
-        if !finite {
-            let message = format!("expected a finite number, found `{text}`");
-            sources.report(node.place, self.path(), message, None);
         }
     }
 }
@@ -417,5 +412,123 @@ fn scalar(text: &str, style: ScalarStyle) -> Value {
             _ => as_text(),
         },
         _ => as_text(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The tree and whether anything was reported.
+    fn tree_of(text: &str) -> (Option<Node>, bool) {
+        let mut sources = Sources::default();
+        let source = sources.add("test", text);
+        let tree = parse(text, source, 0, &mut sources);
+        (tree, sources.count() > 0)
+    }
+
+    /// Keys are names here, whatever they look like; none when they can't be.
+    fn with_names_as_keys(value: Value) -> Option<Value> {
+        match value {
+            Value::Mapping(mapping) => mapping
+                .into_iter()
+                .map(|(key, value)| {
+                    let name = match key {
+                        Value::String(name) => name,
+                        Value::Number(number) => number.to_string(),
+                        _ => return None,
+                    };
+                    Some((Value::String(name), with_names_as_keys(value)?))
+                })
+                .collect::<Option<Mapping>>()
+                .map(Value::Mapping),
+            Value::Sequence(items) => items
+                .into_iter()
+                .map(with_names_as_keys)
+                .collect::<Option<_>>()
+                .map(Value::Sequence),
+            value => Some(value),
+        }
+    }
+
+    fn assert_same_as_serde_yaml(text: &str) {
+        let (Some(tree), false) = tree_of(text) else {
+            panic!("expected a tree of {text}")
+        };
+        assert_eq!(
+            tree.to_value(),
+            serde_yaml::from_str::<Value>(text).unwrap(),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn trees_mean_what_serde_yaml_reads() {
+        for text in [
+            "a: 1\nb: -2.5e-3\nc: 0x10\nd: 1_000\ne: .5\nf: +3\ng: 007",
+            "a: true\nb: yes\nc: ~\nd: null\ne:\nf: 'true'\ng: \"1\"\nh: |\n  two\n  lines\ni: >\n  folded\n  lines\n",
+            "[point: {power: 1, size: [1, 2]}, {spot: {power: 2}}, [a: b]]",
+            "- a: 1\n  b: 2\n-\n  - x\n  - # nothing\n- {}\n- []",
+            "a: &x {b: [1, 2]}\nc: *x\nd: [*x, *x]",
+            "Größe: 'it''s'\n\"k \\u00e9\": a b  c\n? long\n: value",
+        ] {
+            assert_same_as_serde_yaml(text);
+        }
+    }
+
+    #[test]
+    fn places_are_those_of_the_text() {
+        let (tree, _) = tree_of("ä: {b: [1, 23]}\nc: 'd e'");
+        let tree = tree.unwrap();
+        let (node, path) =
+            tree.descend(&[Step::Key("ä".into()), Step::Key("b".into()), Step::Index(1)]);
+        assert_eq!(path, ["ä", "b", "1"]);
+        assert_eq!(
+            node.place,
+            Place {
+                source: 0,
+                line: 1,
+                column: 12,
+                width: 2
+            }
+        );
+        assert_eq!(
+            tree.get("c").unwrap().place,
+            Place {
+                source: 0,
+                line: 2,
+                column: 4,
+                width: 5
+            }
+        );
+        assert_eq!(
+            tree.key_place("c"),
+            Some(Place {
+                source: 0,
+                line: 2,
+                column: 1,
+                width: 1
+            })
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 10_000,
+            failure_persistence: None,
+            rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+            ..ProptestConfig::default()
+        })]
+
+        /// Two parsers that share no code agree on what both take for YAML.
+        #[test]
+        fn flow_texts_mean_what_serde_yaml_reads(text in "(\\{|\\[|\\}|\\]|, |: |a|b: |c |'d'|1|-2|\n| ){0,16}") {
+            if let ((Some(tree), false), Ok(value)) = (tree_of(&text), serde_yaml::from_str::<Value>(&text)) {
+                if let Some(value) = with_names_as_keys(value) {
+                    prop_assert_eq!(tree.to_value(), value);
+                }
+            }
+        }
     }
 }

@@ -7,6 +7,7 @@ mod camera;
 mod document;
 mod light;
 mod material;
+mod mixes;
 mod overrides;
 mod problem;
 mod read;

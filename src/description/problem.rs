@@ -138,12 +138,18 @@ impl Sources {
             return;
         }
         let (name, text) = &self.texts[place.source];
-        let excerpt = text
-            .lines()
-            .nth(place.line.saturating_sub(1))
-            .unwrap_or_default()
-            .trim_end()
-            .to_owned();
+        let mut place = place;
+        let excerpt = match text.lines().nth(place.line - 1) {
+            Some(line) => line,
+            // The end of the text is shown behind its last line.
+            None => {
+                let last = text.lines().last().unwrap_or_default();
+                place.line = text.lines().count().max(1);
+                place.column = last.chars().count() + 1;
+                last
+            }
+        };
+        let excerpt = excerpt.trim_end().to_owned();
         let room = excerpt.chars().count().saturating_sub(place.column - 1);
         self.problems.push(Problem {
             source: name.clone(),

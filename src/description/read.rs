@@ -194,7 +194,7 @@ fn one_of(names: &[String]) -> String {
 fn plain(expected: &str) -> String {
     match expected {
         "f32" => "a number".to_owned(),
-        "u32" | "u64" => "a whole number from 0".to_owned(),
+        "u32" | "u64" => "a whole number, 0 or more".to_owned(),
         "a boolean" => "true or false".to_owned(),
         "a string" => "text".to_owned(),
         "path string" => "the path of a file".to_owned(),

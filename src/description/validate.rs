@@ -1,6 +1,7 @@
 //! What types can't say: ranges, references and shapes that make no sense.
 
 use super::document::{Node, Step, dotted};
+use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Conductor, Description, Film, Filter, Light,
@@ -40,7 +41,7 @@ pub(super) fn description(description: &Description, tree: &Node, sources: &mut 
     for (name, material) in &description.materials {
         check.material(material, root.key("materials").key(name));
     }
-    check.cycles(description);
+    check.mixes(description);
     for (index, object) in description.objects.iter().enumerate() {
         check.object(object, root.key("objects").index(index));
     }
@@ -106,7 +107,7 @@ impl Range {
     fn words(self) -> String {
         match self {
             Self::Positive => "a number above 0".to_owned(),
-            Self::NonNegative => "a number from 0".to_owned(),
+            Self::NonNegative => "a number, 0 or more".to_owned(),
             Self::Within(low, high) => format!("a number from {low} to {high}"),
             Self::Above(low, high) => format!("a number above {low} and up to {high}"),
             Self::Between(low, high) => format!("a number above {low} and below {high}"),
@@ -465,20 +466,9 @@ impl Check<'_> {
     }
 
     /// Mixes that contain themselves.
-    fn cycles(&mut self, description: &Description) {
-        let mut done = BTreeSet::new();
-        for name in description.materials.keys() {
-            let mut trail = Vec::new();
-            if let Some(endless) = find_endless(description, name, &mut trail, &mut done) {
-                let at = At::root().key("materials").key(name);
-                let message = match endless {
-                    Endless::Cycle(names) => {
-                        format!("this mix contains itself: {}", names.join(" → "))
-                    }
-                    Endless::Deep => format!("mixes are nested more than {MAX_MIXES} deep"),
-                };
-                self.report(at, message);
-            }
+    fn mixes(&mut self, description: &Description) {
+        for (name, fault) in mixes::endless(&description.materials) {
+            self.report(At::root().key("materials").key(name), fault);
         }
     }
 
@@ -554,58 +544,5 @@ impl Check<'_> {
             Range::Within(-32.0, 32.0),
             at.key("exposure"),
         );
-    }
-}
-
-/// Deeper mixes are mistakes, and shading them would overflow the stack.
-const MAX_MIXES: usize = 64;
-
-/// A trail of mixes that can't be shaded.
-enum Endless {
-    Cycle(Vec<String>),
-    Deep,
-}
-
-/// Follows the names in mixes from one material on, to the first trail that
-/// returns to where it was before.
-fn find_endless(
-    description: &Description,
-    name: &str,
-    trail: &mut Vec<String>,
-    done: &mut BTreeSet<String>,
-) -> Option<Endless> {
-    if let Some(start) = trail.iter().position(|earlier| earlier == name) {
-        done.extend(trail.iter().cloned());
-        return Some(Endless::Cycle(
-            [&trail[start..], &[name.to_owned()]].concat(),
-        ));
-    }
-    if trail.len() == MAX_MIXES {
-        done.extend(trail.iter().cloned());
-        return Some(Endless::Deep);
-    }
-    if done.contains(name) {
-        return None;
-    }
-    trail.push(name.to_owned());
-    let mut names = Vec::new();
-    if let Some(material) = description.materials.get(name) {
-        mixed_names(material, &mut names);
-    }
-    let cycle = names
-        .into_iter()
-        .find_map(|next| find_endless(description, next, trail, done));
-    trail.pop();
-    done.insert(name.to_owned());
-    cycle
-}
-
-fn mixed_names<'a>(material: &'a Material, names: &mut Vec<&'a str>) {
-    let Material::Mix(mix) = material else { return };
-    for part in [&mix.a, &mix.b] {
-        match part {
-            MaterialRef::Name(name) => names.push(name),
-            MaterialRef::Inline(material) => mixed_names(material, names),
-        }
     }
 }

@@ -169,7 +169,10 @@ impl AovSet {
 
 impl FromIterator<Aov> for AovSet {
     fn from_iter<I: IntoIterator<Item = Aov>>(aovs: I) -> Self {
-        Self(aovs.into_iter().fold(0, |bits, aov| bits | 1 << aov as u8))
+        Self(
+            aovs.into_iter()
+                .fold(0, |bits, aov| bits | (1 << aov as u8)),
+        )
     }
 }
 

@@ -2,9 +2,9 @@
 //!
 //! Layout, all little-endian: the magic bytes and the version; the fingerprint
 //! of what is rendered (u64); resolution and window (6 × u32); the AOVs' bits
-//! (u8); then per tile its colour sums (per pixel 6 × f64, 2 × u32), its AOV
-//! sums (f64), and its faults (per cause a u64 count, a u32 number of pixels and
-//! 2 × u32 each); last a checksum of all that (u64).
+//! (u8); then per tile its colour sums (per pixel 6 × f64, 6 × f32, 2 × u32),
+//! its AOV sums (f64), and its faults (per cause a u64 count, a u32 number of
+//! pixels and 2 × u32 each); last a checksum of all that (u64).
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::tile::{FAULT_PIXELS, Fault};
 use super::{AovSet, Film, OutputError, Window, output};
 
-const MAGIC: &[u8; 16] = b"smithwalk film\0\x01";
+const MAGIC: &[u8; 16] = b"smithwalk film\0\x02";
 
 /// Why a saved film can't be taken up again.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +75,9 @@ impl Film {
         for tile in &self.tiles {
             for color in &tile.colors {
                 for value in color.sum.iter().chain(&color.squares) {
+                    bytes.extend_from_slice(&value.to_le_bytes());
+                }
+                for value in color.milestone.iter().chain(&color.moved) {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
                 bytes.extend_from_slice(&color.count.to_le_bytes());
@@ -171,6 +174,10 @@ impl Reader<'_> {
         self.take().map(u64::from_le_bytes)
     }
 
+    fn f32(&mut self) -> Option<f32> {
+        self.take().map(f32::from_le_bytes)
+    }
+
     fn f64(&mut self) -> Option<f64> {
         self.take().map(f64::from_le_bytes)
     }
@@ -182,6 +189,9 @@ impl Reader<'_> {
             for color in &mut tile.colors {
                 for value in color.sum.iter_mut().chain(&mut color.squares) {
                     *value = self.f64()?;
+                }
+                for value in color.milestone.iter_mut().chain(&mut color.moved) {
+                    *value = self.f32()?;
                 }
                 color.count = self.u32()?;
                 color.left_out = self.u32()?;

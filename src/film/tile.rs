@@ -118,6 +118,10 @@ impl FaultCount {
 pub(super) struct ColorSum {
     pub sum: [f64; 3],
     pub squares: [f64; 3],
+    /// The mean when the count last was a power of two.
+    pub milestone: [f32; 3],
+    /// How far the mean had moved by then, since the power of two before.
+    pub moved: [f32; 3],
     /// Samples averaged in.
     pub count: u32,
     /// Samples left out for a [`Fault`] of their colour.
@@ -180,6 +184,13 @@ impl FilmTile {
             let value = f64::from(value);
             color.sum[channel] += value;
             color.squares[channel] += value * value;
+        }
+        if color.count.is_power_of_two() {
+            for channel in 0..3 {
+                let mean = (color.sum[channel] / f64::from(color.count)) as f32;
+                color.moved[channel] = mean - color.milestone[channel];
+                color.milestone[channel] = mean;
+            }
         }
         if self.stride > 0 {
             self.add_aovs(pixel, index, sample);
@@ -249,6 +260,20 @@ impl FilmTile {
             let deviations = color.squares[channel] - sum * sum / n;
             deviations.max(0.0) / (n * (n - 1.0))
         })
+    }
+
+    /// An estimate of the variance of [`Self::color`] that is far too uncertain
+    /// for a single pixel, but sees what stratification gains: the squared
+    /// distance that the mean moved when the number of samples n₂ last doubled.
+    /// With the means m₁, m₂ of both halves that is (m₁ − m₂)²/4; if it were not
+    /// for the strata that the halves share, its expectation would be the
+    /// variance of (m₁ + m₂)/2. Samples since then are taken to reduce it by
+    /// n₂/n. Useless with fewer than two samples.
+    pub(super) fn doubling_variance(&self, pixel: [u32; 2]) -> [f64; 3] {
+        let color = &self.colors[self.window.index(pixel)];
+        let doubled = color.count.checked_ilog2().map_or(0, |log2| 1 << log2);
+        let share = f64::from(doubled) / f64::from(color.count);
+        color.moved.map(|moved| share * f64::from(moved).powi(2))
     }
 
     /// The channels of `aov` in `pixel`.

@@ -143,11 +143,21 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                     distance: last.travelled + hit.t,
                 });
             }
-            if bounce > self.scene.max_bounces {
-                break;
-            }
-
             let layers = self.scene.layers(&surface);
+            if bounce > self.scene.max_bounces {
+                // No more scattering, but what goes straight through still arrives.
+                throughput *= layers.transparency();
+                vertex += 1;
+                if !has::<F>(Features::TRANSPARENCY)
+                    || throughput == Rgb::ZERO
+                    || vertex > MAX_STRAIGHT
+                {
+                    break;
+                }
+                last.travelled += hit.t;
+                ray = surface.spawn(ray.direction);
+                continue;
+            }
             let wo = -ray.direction;
             if has::<F>(Features::LIGHT_SAMPLING) && layers.has_smooth() {
                 let direct = self.direct(&surface, &layers, wo, vertex, sampler, &mut result.rays);

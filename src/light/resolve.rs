@@ -96,11 +96,15 @@ pub fn resolve_light(
             Shape::Sun(if half_angle < LEAST_SUN {
                 SunLight::parallel(towards, irradiance)
             } else {
-                let ratio = match units {
-                    LightUnits::Cycles4 => half_angle.sin(),
-                    LightUnits::Cycles3 => half_angle.tan(),
-                };
-                SunLight::disk(towards, half_angle, irradiance / (PI * ratio * ratio))
+                let radiance = |ratio: f32| irradiance / (PI * ratio * ratio);
+                match units {
+                    LightUnits::Cycles4 => {
+                        SunLight::disk(towards, half_angle, radiance(half_angle.sin()))
+                    }
+                    LightUnits::Cycles3 => {
+                        SunLight::flat_disk(towards, half_angle, radiance(half_angle.tan()))
+                    }
+                }
             })
         }
         LightKind::Area {

@@ -17,8 +17,23 @@ pub struct SunLight {
 enum Face {
     /// Irradiance of a plane facing the sun, W·m⁻².
     Point(Rgb),
-    /// Radiance, W·m⁻²·sr⁻¹.
-    Disk { radiance: Rgb, one_minus_cos: f32 },
+    /// A cone of directions.
+    Disk {
+        /// Radiance of the centre, W·m⁻²·sr⁻¹.
+        radiance: Rgb,
+        one_minus_cos: f32,
+        /// Whether the radiance grows from the centre with 1/cos³.
+        flat: bool,
+    },
+}
+
+/// The radiance at the angle with this cosine from the centre.
+fn radiance_at(radiance: Rgb, flat: bool, cos: f32) -> Rgb {
+    if flat {
+        radiance / (cos * cos * cos)
+    } else {
+        radiance
+    }
 }
 
 impl SunLight {
@@ -42,8 +57,21 @@ impl SunLight {
             face: Face::Disk {
                 radiance,
                 one_minus_cos: 2.0 * sin_of_half * sin_of_half,
+                flat: false,
             },
         }
+    }
+
+    /// The same sun as Cycles had it before Blender 4.0: all points of a flat
+    /// disk at distance 1 count alike, so that the radiance is `radiance` at
+    /// the centre and grows with 1/cos³ of the angle from there.
+    #[must_use]
+    pub fn flat_disk(towards: Vec3, half_angle: f32, radiance: Rgb) -> Self {
+        let mut sun = Self::disk(towards, half_angle, radiance);
+        if let Face::Disk { flat, .. } = &mut sun.face {
+            *flat = true;
+        }
+        sun
     }
 
     /// The luminance of the irradiance of a plane that faces the sun, W·m⁻².
@@ -53,7 +81,14 @@ impl SunLight {
             Face::Disk {
                 radiance,
                 one_minus_cos,
+                flat: false,
             } => luminance(radiance) * PI * one_minus_cos * (2.0 - one_minus_cos),
+            // The mean of cosθ over a disk of radius tan: 2π(1/cos − 1) · L.
+            Face::Disk {
+                radiance,
+                one_minus_cos,
+                flat: true,
+            } => luminance(radiance) * 2.0 * PI * one_minus_cos / (1.0 - one_minus_cos),
         }
     }
 
@@ -65,9 +100,12 @@ impl SunLight {
             Face::Disk {
                 radiance,
                 one_minus_cos,
+                flat,
             } => {
                 let cone = Cone::new(self.towards, one_minus_cos);
-                (cone.sample(u).0, radiance, selection * cone.pdf(), false)
+                let direction = cone.sample(u).0;
+                let radiance = radiance_at(radiance, flat, direction.dot(self.towards));
+                (direction, radiance, selection * cone.pdf(), false)
             }
         };
         LightSample {
@@ -89,8 +127,10 @@ impl SunLight {
             Face::Disk {
                 radiance,
                 one_minus_cos,
+                flat,
             } => {
                 let cone = Cone::new(self.towards, one_minus_cos);
+                let radiance = radiance_at(radiance, flat, direction.dot(self.towards));
                 cone.contains(direction).then(|| (radiance, cone.pdf()))
             }
         }

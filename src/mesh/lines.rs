@@ -22,7 +22,7 @@ pub(super) struct Lines<R> {
     number: usize,
     /// How many positions, texture coordinates and normals came so far.
     counts: [u64; 3],
-    /// Corners that name what has not come yet: line, kind and index.
+    /// The corners that name what is farthest ahead: line, kind and index.
     ahead: Vec<(usize, usize, u64)>,
     names: Vec<String>,
     known_names: HashSet<String>,
@@ -71,21 +71,18 @@ impl<R: BufRead> Lines<R> {
 
     /// Judges what the parser made of the lines.
     pub fn finish(mut self, loaded: tobj::LoadResult) -> Result<Parts, Vec<LineProblem>> {
-        let beyond = self
-            .ahead
-            .iter()
-            .filter(|(_, kind, index)| *index > self.counts[*kind]);
-        let beyond: Vec<_> = beyond
-            .map(|&(line, kind, index)| LineProblem {
-                line: Some(line),
-                message: format!(
-                    "there is no {} {index}; the last before the end of its group is {}",
-                    KINDS[kind], self.counts[kind]
-                ),
-            })
-            .collect();
-        self.problems.extend(beyond);
+        for &(line, kind, index) in &self.ahead {
+            let count = self.counts[kind];
+            if index > count {
+                let message = format!("there is no {} {index}, only {count}", KINDS[kind]);
+                self.problems.push(LineProblem {
+                    line: Some(line),
+                    message,
+                });
+            }
+        }
         self.problems.sort_by_key(|problem| problem.line);
+        self.problems.dedup();
         self.problems.truncate(MAX_PROBLEMS);
         match loaded {
             Ok((models, _)) if self.problems.is_empty() => {
@@ -98,10 +95,14 @@ impl<R: BufRead> Lines<R> {
                 }
                 Ok((models, self.names, repairs))
             }
-            Err(error) if self.problems.is_empty() => Err(vec![LineProblem {
-                line: Some(self.number),
-                message: error.to_string(),
-            }]),
+            Err(error) if self.problems.is_empty() => {
+                let line = String::from_utf8_lossy(&self.raw);
+                let message = format!("{error} in `{}`", line.trim());
+                Err(vec![LineProblem {
+                    line: Some(self.number),
+                    message,
+                }])
+            }
             _ => Err(self.problems),
         }
     }
@@ -148,8 +149,9 @@ impl<R: BufRead> Lines<R> {
     }
 
     fn line(&mut self, line: &str) {
-        let line = line.trim_start_matches('\u{feff}').trim();
-        let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let line = line.strip_prefix('\u{feff}').unwrap_or(line).trim_ascii();
+        let end = line.bytes().position(|byte| byte.is_ascii_whitespace());
+        let (keyword, rest) = line.split_at(end.unwrap_or(line.len()));
         let values = rest.split('#').next().unwrap_or_default();
         match keyword {
             "v" => {
@@ -177,10 +179,10 @@ impl<R: BufRead> Lines<R> {
     fn numbers(&mut self, keyword: &str, values: &str, wanted: usize, kind: usize) {
         self.counts[kind] += 1;
         self.ready.extend_from_slice(keyword.as_bytes());
+        // Only letters make numbers that are none, and texts this long ones out of range.
+        let plain = values.len() < 60 && !values.bytes().any(|byte| byte.is_ascii_alphabetic());
         let mut found = 0;
         for word in values.split_ascii_whitespace().take(wanted) {
-            // Only letters make numbers that are none, and texts this long ones out of range.
-            let plain = word.len() < 30 && !word.bytes().any(|byte| byte.is_ascii_alphabetic());
             let number = if plain {
                 Some(0.0)
             } else {
@@ -252,9 +254,13 @@ impl<R: BufRead> Lines<R> {
         if parts.next().is_some() {
             return Err(format!("expected a corner like 1/2/3, found `{corner}`"));
         }
+        self.ready.push(b' ');
+        if self.wanted == Wanted::ALL && !corner.contains('-') {
+            self.ready.extend_from_slice(corner.as_bytes());
+            return Ok(());
+        }
         let vt = indices[1] * u64::from(self.wanted.uvs);
         let vn = indices[2] * u64::from(self.wanted.normals);
-        self.ready.push(b' ');
         push_decimal(&mut self.ready, indices[0]);
         if vt > 0 || vn > 0 {
             self.ready.push(b'/');
@@ -292,8 +298,13 @@ impl<R: BufRead> Lines<R> {
             if u32::try_from(index).is_err() {
                 return Err(format!("there is no {} {index}", KINDS[kind]));
             }
-            if self.ahead.len() < MAX_PROBLEMS {
-                self.ahead.push((self.number, kind, index));
+            let corner = (self.number, kind, index);
+            self.ahead.push(corner);
+            if self.ahead.len() > MAX_PROBLEMS {
+                // Those farthest ahead are the ones that may never come.
+                self.ahead
+                    .sort_by_key(|&(_, _, index)| std::cmp::Reverse(index));
+                self.ahead.truncate(MAX_PROBLEMS);
             }
         }
         Ok(index)
@@ -330,7 +341,14 @@ fn push_decimal(out: &mut Vec<u8>, mut number: u64) {
 impl<R: BufRead> BufRead for Lines<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.taken == self.ready.len() {
-            self.advance()?;
+            if let Err(error) = self.advance() {
+                let message = format!("the mesh can't be read: {error}");
+                self.problems.push(LineProblem {
+                    line: None,
+                    message,
+                });
+                return Err(error);
+            }
         }
         Ok(&self.ready[self.taken..])
     }

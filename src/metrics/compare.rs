@@ -2,6 +2,7 @@
 
 use crate::film::{Image, Window};
 
+use super::ztest::guard_variance;
 use super::{
     DifferenceMap, ZTest, flip, mean, mse, rel_bias, rel_bias_trimmed, rel_mse, rel_mse_trimmed,
     relative_difference_map, z_map, z_test,
@@ -74,7 +75,8 @@ pub struct Comparison {
 pub struct Pair {
     a: Image,
     b: Image,
-    /// Sum of the variances of those that have a layer of that name.
+    /// Sum of the variances of those that have a layer of that name, guarded
+    /// against events that a pixel has not seen.
     variance: Option<Vec<[f64; 3]>>,
 }
 
@@ -104,8 +106,8 @@ impl Pair {
         for layer in [layer(&a), layer(&b)].into_iter().flatten() {
             let sum: &mut Vec<[f64; 3]> =
                 variance.get_or_insert_with(|| vec![[0.0; 3]; window.area()]);
-            for (sum, value) in sum.iter_mut().zip(layer) {
-                *sum = [0, 1, 2].map(|c| sum[c] + f64::from(value[c]));
+            for (sum, value) in sum.iter_mut().zip(guard_variance(window, &layer)) {
+                *sum = [0, 1, 2].map(|c| sum[c] + value[c]);
             }
         }
         Ok(Self { a, b, variance })

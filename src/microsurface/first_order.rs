@@ -1,6 +1,8 @@
 //! Single scattering, with the depth integrated out.
 
-use super::{At, Draw, Exit, Facets, Microsurface, Ndf, Phase, Real, Rgb, Side, Vector3, ln_beta};
+use super::{
+    At, Draw, Exit, Facets, Microsurface, Ndf, Phase, Real, Rgb, Side, Vector3, enters, ln_beta,
+};
 
 impl<N, I> Microsurface<N, I> {
     /// The first order of f(ω_i, ω_o) |cosθ_o| (sr⁻¹). Exact for conductors
@@ -34,7 +36,7 @@ impl<N, I> Microsurface<N, I> {
         N: Ndf<F>,
         I: Facets<F>,
     {
-        if !(wi.z > F::zero() && wi.is_finite()) {
+        if !enters(wi) {
             return None;
         }
         if let Some(tint) = self.facets.invisible() {

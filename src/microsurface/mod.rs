@@ -103,10 +103,19 @@ pub enum Estimator {
     /// The first order in closed form; higher ones from a walk on either
     /// side, combined by the balance heuristic. Bounded.
     TwoWalk,
-    /// The two walks with the depth integrated out. For conductors; other
-    /// facets fall back to [`Estimator::TwoWalk`].
+    /// The two walks with the depth integrated out, the best for conductors.
+    /// Other facets, and α above about 5, where orders are too many for it,
+    /// fall back to [`Estimator::TwoWalk`].
     PositionFree,
 }
+
+/// Λ at tanθ = 2 from which [`Estimator::PositionFree`] is not worth its time,
+/// which goes with the square of the order.
+const STEEP: f64 = 5.0;
+
+/// Cosines up to this are grazing: nothing is scattered. Rates σ/cosθ above it
+/// are finite in single precision too.
+const GRAZING: f64 = 1e-30;
 
 impl<N, I> Microsurface<N, I> {
     /// Estimates f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by `estimator`, giving each
@@ -128,9 +137,21 @@ impl<N, I> Microsurface<N, I> {
         }
         match estimator {
             Estimator::Walk => self.eval_walk(wi, wo, rng, tally),
-            Estimator::PositionFree if I::MIRRORS => self.eval_position_free(wi, wo, rng, tally),
+            Estimator::PositionFree if I::MIRRORS && self.steep_lambda() < F::of(STEEP) => {
+                self.eval_position_free(wi, wo, rng, tally)
+            }
             Estimator::TwoWalk | Estimator::PositionFree => self.eval_two_walk(wi, wo, rng, tally),
         }
+    }
+
+    /// Λ at tanθ = 2, between the axes: a one-number summary of roughness.
+    #[inline]
+    fn steep_lambda<F: Real>(&self) -> F
+    where
+        N: Ndf<F>,
+    {
+        let (side, up) = (F::of(0.4f64.sqrt()), F::of(0.2f64.sqrt()));
+        self.ndf.lambda(Vector3::new(side, side, up))
     }
 
     /// Whether light can go from `wi` to `wo` other than straight on.
@@ -139,11 +160,14 @@ impl<N, I> Microsurface<N, I> {
     where
         I: Facets<F>,
     {
-        let leaves = wo.z > F::zero() || (I::TRANSMITS && wo.z < F::zero());
-        wi.z > F::zero()
-            && leaves
-            && wi.is_finite()
-            && wo.is_finite()
-            && self.facets.invisible().is_none()
+        let grazing = F::of(GRAZING);
+        let leaves = wo.z > grazing || (I::TRANSMITS && wo.z < -grazing);
+        enters(wi) && leaves && wo.is_finite() && self.facets.invisible().is_none()
     }
+}
+
+/// Whether light can come in from `wi`.
+#[inline]
+fn enters<F: Real>(wi: Vector3<F>) -> bool {
+    wi.z > F::of(GRAZING) && wi.is_finite()
 }

@@ -3,7 +3,8 @@
 //! For mirrors, the phase function does not depend on depth, and the depth
 //! enters by exponentials only. Its distribution at a facet, given all
 //! directions so far, stays a mixture of sums of exponential variables, on
-//! which descending, climbing and escaping act in closed form.
+//! which descending, climbing and escaping act in closed form. A step costs
+//! time in proportion to the steps down so far.
 
 use super::two_walk::kept_inside;
 use super::walk::survives;
@@ -63,11 +64,13 @@ impl<F: Real> Depth<F> {
             passing = here * (stage.rate * split);
             collided += stage.start;
         }
-        if collided > F::zero() {
-            let norm = collided.recip();
-            for stage in &mut self.stages {
-                stage.start *= norm;
-            }
+        // A chance without a finite reciprocal never comes true.
+        if collided < F::min_positive_value() {
+            return F::zero();
+        }
+        let norm = collided.recip();
+        for stage in &mut self.stages {
+            stage.start *= norm;
         }
         collided
     }

@@ -1,7 +1,7 @@
 //! A density in closed form that follows the BSDF, for multiple importance
 //! sampling. The walk's own density is not known.
 
-use super::{Facets, Microsurface, Ndf, Real, Side, Vector3};
+use super::{Facets, Microsurface, Ndf, Real, Vector3};
 
 /// The least share of the cosine lobe: it keeps the density positive where
 /// that of the first bounce underflows.
@@ -55,21 +55,18 @@ impl<N, I> Microsurface<N, I> {
             return F::zero();
         }
         let at = self.entrance(wi);
-        debug_assert_eq!(at.side, Side::Above);
         self.facets
             .phase(&self.ndf, at, wo, wo.z < F::zero(), wi)
             .density
     }
 
-    /// A cheap guess of the share of orders ≥ 2: with Λ at tanθ = 2, between
-    /// the axes, 1 − e^{−3Λ/2} is near that of white GGX mirrors for α ≤ 1.
+    /// A cheap guess of the share of orders ≥ 2: 1 − e^{−3Λ/2} is near that of
+    /// white GGX mirrors for α ≤ 1.
     #[inline]
     fn multiple_share<F: Real>(&self) -> F
     where
         N: Ndf<F>,
     {
-        let (side, up) = (F::of(0.4f64.sqrt()), F::of(0.2f64.sqrt()));
-        let lambda = self.ndf.lambda(Vector3::new(side, side, up));
-        (-(-F::of(1.5) * lambda).exp_m1()).max(F::of(LEAST_SHARE))
+        (-(-F::of(1.5) * self.steep_lambda()).exp_m1()).max(F::of(LEAST_SHARE))
     }
 }

@@ -7,8 +7,9 @@ use std::fmt::Debug;
 /// that the model needs.
 pub trait Real: Float + FloatConst + NumAssign + Debug + Default + Send + Sync + 'static {
     /// The abscissa from which [`Real::mills_excess`] uses its continued
-    /// fraction, and the number of terms that reaches full precision there.
-    const FRACTION: (f64, u32);
+    /// fraction, and c in the number c/x + 3 of terms that reaches full
+    /// precision there.
+    const FRACTION: (f64, f64);
 
     /// The nearest value to `x`.
     fn of(x: f64) -> Self;
@@ -37,6 +38,7 @@ pub trait Real: Float + FloatConst + NumAssign + Debug + Default + Send + Sync +
             return (-self * self).exp() / (Self::PI().sqrt() * self.erfc()) - self;
         }
         let mut tail = Self::zero();
+        let terms = (Self::of(terms) / self).to_u32().unwrap_or(0) + 3;
         for k in (1..=terms).rev() {
             tail = Self::of(0.5 * f64::from(k)) / (self + tail);
         }
@@ -51,15 +53,16 @@ pub trait Real: Float + FloatConst + NumAssign + Debug + Default + Send + Sync +
         if self < Self::of(Self::FRACTION.0) {
             return gauss - self * self.erfc();
         }
-        // With x = ∞ the fraction is 0 and so must be the result.
+        if gauss == Self::zero() {
+            return gauss;
+        }
         let t = self.mills_excess();
         gauss * (t / (self + t))
     }
 }
 
 impl Real for f32 {
-    // Relative error of t at 2: 6e-7 · 1e-2 of what f32 resolves in ierfc.
-    const FRACTION: (f64, u32) = (2.0, 16);
+    const FRACTION: (f64, f64) = (2.0, 32.0);
 
     #[inline(always)]
     fn of(x: f64) -> Self {
@@ -88,7 +91,7 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
-    const FRACTION: (f64, u32) = (3.0, 32);
+    const FRACTION: (f64, f64) = (3.0, 96.0);
 
     #[inline(always)]
     fn of(x: f64) -> Self {

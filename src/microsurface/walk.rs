@@ -1,6 +1,8 @@
 //! The walk among the micro-facets.
 
-use super::{At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
+use super::{
+    At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3, enters,
+};
 
 /// Weights below this are played against: continuing costs more than it can
 /// bring. From [`ROULETTE_FROM`] on, so that dark surfaces keep a clean first
@@ -11,8 +13,10 @@ const ROULETTE_WEIGHT: f64 = 1.0 / 16.0;
 const ROULETTE_FROM: u32 = 3;
 
 /// From this order on a walk plays whatever its weight, and reaches order n
-/// with probability (LONG/n)²: the expected number of steps of any walk is
-/// below 2·LONG, and the mean is kept. Walks get here at α ≥ 10 alone.
+/// with probability (LONG/n)³: the expected number of steps of any walk is
+/// below 1.5·LONG, and the mean is kept. A chance that falls by a power leaves
+/// the weights a finite variance, as orders are exponentially distributed.
+/// Walks get here at α ≥ 10 alone.
 const LONG: u32 = 4096;
 
 /// Light on its way.
@@ -116,7 +120,7 @@ pub(super) fn survives<F: Real>(
     }
     if order >= LONG {
         let n = f64::from(order);
-        chance *= F::of((n / (n + 1.0)).powi(2));
+        chance *= F::of((n / (n + 1.0)).powi(3));
     }
     if chance < F::one() {
         if rng.draw() >= chance {
@@ -136,7 +140,7 @@ impl<N, I> Microsurface<N, I> {
         N: Ndf<F>,
         I: Facets<F>,
     {
-        if !(wi.z > F::zero() && wi.is_finite()) {
+        if !enters(wi) {
             return None;
         }
         if let Some(tint) = self.facets.invisible() {

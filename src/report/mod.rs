@@ -1,5 +1,6 @@
 //! Reports: what was measured, as tables, figures and pages.
 
+pub mod converge;
 pub mod heightfield;
 pub mod plot;
 pub mod validate;

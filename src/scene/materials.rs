@@ -9,7 +9,7 @@ use super::material::{
     Distribution, Facet, Leaf, Material, Number, RoughMaterial, Roughness, Tangent, Tint,
     WeightedLeaf,
 };
-use crate::bsdf::{MAX_LAYERS, Method};
+use crate::bsdf::{Albedos, MAX_LAYERS, Method, Normals, WhiteFacets};
 use crate::color::Rgb;
 use crate::description as desc;
 use crate::microsurface::{self as model, ConductorFresnel};
@@ -217,16 +217,17 @@ impl<'a> Names<'a> {
             desc::Tangent::Uv => Tangent::Uv,
             desc::Tangent::Radial(axis) => Tangent::Radial(axis),
         };
+        let distribution = match rough.distribution {
+            desc::Distribution::Ggx => Distribution::Ggx,
+            desc::Distribution::Beckmann => Distribution::Beckmann,
+        };
         Ok(Leaf::Rough(RoughMaterial {
-            distribution: match rough.distribution {
-                desc::Distribution::Ggx => Distribution::Ggx,
-                desc::Distribution::Beckmann => Distribution::Beckmann,
-            },
+            distribution,
             roughness,
             rotation: self.number(&rough.rotation)?,
             tangent,
             facet,
-            method: method(self.estimator, rough.scattering, facet),
+            method: method(self.estimator, rough.scattering, distribution, facet),
         }))
     }
 }
@@ -234,7 +235,12 @@ impl<'a> Names<'a> {
 /// The estimator for a material: what the file insists on, or for `auto` the
 /// one that measured best for these facets. The position-free estimator is for
 /// conductors; where it does not exist, two walks do the work.
-fn method(asked: desc::Estimator, scattering: desc::Scattering, facet: Facet) -> Method {
+fn method(
+    asked: desc::Estimator,
+    scattering: desc::Scattering,
+    distribution: Distribution,
+    facet: Facet,
+) -> Method {
     let metal = matches!(facet, Facet::Metal(_) | Facet::Tinted(_));
     match (scattering, asked) {
         (desc::Scattering::Single, _) | (_, desc::Estimator::Single) => Method::Single,
@@ -246,8 +252,22 @@ fn method(asked: desc::Estimator, scattering: desc::Scattering, facet: Facet) ->
         (_, desc::Estimator::Auto | desc::Estimator::PositionFree) => {
             Method::Multiple(model::Estimator::TwoWalk)
         }
-        (_, desc::Estimator::Compensated) => Method::Compensated,
+        (_, desc::Estimator::Compensated) => Method::Compensated(albedos(distribution, facet)),
     }
+}
+
+/// The table that single scattering on such facets is scaled by.
+fn albedos(distribution: Distribution, facet: Facet) -> &'static Albedos {
+    let normals = match distribution {
+        Distribution::Ggx => Normals::Ggx,
+        Distribution::Beckmann => Normals::Beckmann,
+    };
+    let white = match facet {
+        Facet::Metal(_) | Facet::Tinted(_) => WhiteFacets::Conductor,
+        Facet::Glass(ior, _) => WhiteFacets::Dielectric(ior),
+        Facet::Matte(_) => WhiteFacets::Diffuse,
+    };
+    Albedos::of(normals, white)
 }
 
 /// η and k of a metal for red, green and blue (650, 550 and 450 nm), rounded

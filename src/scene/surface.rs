@@ -87,11 +87,8 @@ impl Surface {
             n * distance
         };
         let lifted = self.position + offset;
-        let away = |x: f32, o: f32| match o.partial_cmp(&0.0) {
-            Some(std::cmp::Ordering::Greater) => x.next_up(),
-            Some(std::cmp::Ordering::Less) => x.next_down(),
-            _ => x,
-        };
+        // One more step of the last place: the sum above may have rounded back.
+        let away = |x: f32, o: f32| x + f32::EPSILON * x.abs() * o.signum();
         let origin = Vec3::new(
             away(lifted.x, offset.x),
             away(lifted.y, offset.y),

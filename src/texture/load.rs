@@ -2,13 +2,15 @@
 
 use super::{Image, Repair, Texels, TextureError};
 use exr::prelude::{ReadChannels, ReadLayers};
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// In bytes. An image that claims more is broken, or no texture.
 const MAX_MEMORY: u64 = 8 << 30;
+/// Brighter is no light, and decoding or summing it could overflow.
+const MAX_VALUE: f32 = 1e15;
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from all directions.
@@ -100,22 +102,23 @@ pub(super) fn image(path: &Path) -> Result<(Image, Vec<Repair>), TextureError> {
     if let Texels::F32(values) = &mut image.texels {
         let broken = values
             .iter_mut()
-            .filter(|value| !value.is_finite())
+            .filter(|value| value.is_nan() || value.abs() > MAX_VALUE)
             .map(|value| *value = 0.0)
             .count();
         if broken > 0 {
-            repairs.push(Repair::NonFinite(broken));
+            repairs.push(Repair::OutOfRange(broken));
         }
     }
     Ok((image, repairs))
 }
 
 /// By content, not by the file's extension.
-fn other_image(reader: BufReader<File>) -> Result<Image, String> {
-    let mut reader = ImageReader::new(reader)
+fn other_image(mut file: BufReader<File>) -> Result<Image, String> {
+    let mut reader = ImageReader::new(&mut file)
         .with_guessed_format()
         .map_err(|error| error.to_string())?;
-    if reader.format().is_none() {
+    let format = reader.format();
+    if format.is_none() {
         return Err(
             "expected a PNG, JPEG, TIFF, HDR or EXR image, found something else".to_owned(),
         );
@@ -125,7 +128,12 @@ fn other_image(reader: BufReader<File>) -> Result<Image, String> {
     reader.limits(limits);
     let image = reader
         .decode()
-        .map_err(|error| format!("the image is broken: {error}"))?;
+        .map_err(|error| format!("the image is broken: {}", error.to_string().trim()))?;
+    if format == Some(ImageFormat::Jpeg)
+        && !is_whole_jpeg(&mut file).map_err(|error| error.to_string())?
+    {
+        return Err("the image is broken: unexpected end of file".to_owned());
+    }
     let (width, height) = (image.width() as usize, image.height() as usize);
     let from_u16 = |values: Vec<u16>| {
         Texels::F32(values.into_iter().map(|v| f32::from(v) / 65535.0).collect())
@@ -148,6 +156,18 @@ fn other_image(reader: BufReader<File>) -> Result<Image, String> {
         channels,
         texels,
     })
+}
+
+/// Whether the marker that ends a JPEG follows the last one that starts
+/// pixels: the decoder fills in what is missing.
+fn is_whole_jpeg(file: &mut BufReader<File>) -> std::io::Result<bool> {
+    const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
+    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(0))?;
+    file.read_to_end(&mut bytes)?;
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    Ok(last(END_OF_IMAGE) > last(START_OF_SCAN))
 }
 
 /// The first layer that has colours, or else luminance; Blender's names such

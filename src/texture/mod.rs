@@ -62,8 +62,8 @@ enum Texels {
 /// What was amiss with an image and how it was made good.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Repair {
-    /// So many values were infinite or NaN, and became 0.
-    NonFinite(usize),
+    /// So many values were NaN, infinite or beyond ±1e15, and became 0.
+    OutOfRange(usize),
     /// So many values of an environment were negative, and became 0.
     Negative(usize),
 }
@@ -71,7 +71,12 @@ pub enum Repair {
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::NonFinite(n) => write!(f, "{n} values that are no finite numbers set to 0"),
+            Self::OutOfRange(n) => {
+                write!(
+                    f,
+                    "{n} values that are NaN, infinite or beyond 1e15 set to 0"
+                )
+            }
             Self::Negative(n) => write!(f, "{n} negative radiances set to 0"),
         }
     }
@@ -138,7 +143,12 @@ impl Texture {
         let [u, v] = [0, 1].map(|axis| {
             let place =
                 f64::from(uv[axis]) * f64::from(self.scale[axis]) + f64::from(self.offset[axis]);
-            place - place.floor()
+            // Coordinates that are none would make colours that are none.
+            if place.is_finite() {
+                place - place.floor()
+            } else {
+                0.0
+            }
         });
         let [x, y] = [u * width as f64, v * height as f64];
         let mut value = match self.interpolation {

@@ -82,10 +82,10 @@ pub fn render_furnace(
     render(&request, &mut film, |_| ());
     let image = film.develop();
     let depth = image
-        .layer("Depth")
+        .layer(Aov::Depth.name())
         .and_then(|l| l.planes.first())
         .context("no depth")?;
-    let variance = image.layer("Variance").context("no variance")?;
+    let variance = image.layer(Aov::Variance.name()).context("no variance")?;
     let mean_of = |values: [f32; 3]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
     let seen: Vec<(f64, f64)> = (0..image.color.len())
         .filter(|&i| depth[i] < 1e9)

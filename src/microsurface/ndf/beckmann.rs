@@ -1,4 +1,4 @@
-use super::{Ndf, Real, Vector3, rotate_to_azimuth};
+use super::{Ndf, Real, Vector3, length, rotate_to_azimuth};
 
 /// The Beckmann distribution with slope roughness α (√2 times the RMS slope)
 /// along x and y: Gaussian slopes, D(m) = exp(−tan²θ_m) / (π α_x α_y m_z⁴)
@@ -44,7 +44,7 @@ impl<F: Real> Ndf<F> for Beckmann<F> {
     /// w_z more above, where s = w_z/a. No difference of nearly equal terms.
     #[inline]
     fn projected_area(&self, w: Vector3<F>) -> F {
-        let s = (self.alpha_x * w.x).hypot(self.alpha_y * w.y);
+        let s = length(self.alpha_x * w.x, self.alpha_y * w.y);
         if s == F::zero() {
             return w.z.max(F::zero());
         }
@@ -59,7 +59,7 @@ impl<F: Real> Ndf<F> for Beckmann<F> {
     fn sample_visible(&self, w: Vector3<F>, u: [F; 2]) -> Vector3<F> {
         let one = F::one();
         let w = Vector3::new(self.alpha_x * w.x, self.alpha_y * w.y, w.z).normalized();
-        let sin = w.x.hypot(w.y);
+        let sin = length(w.x, w.y);
         // The half step keeps the quantile of u = 0 finite.
         let quantile = |u: F| u.max(F::of(0.25) * F::epsilon());
         let along = if w.z >= F::zero() {
@@ -81,35 +81,46 @@ impl<F: Real> Ndf<F> for Beckmann<F> {
     }
 }
 
-/// Newton steps before a root is taken as it is. After the first step they
-/// rise monotonically to the root, so this only bounds the run time.
-const MAX_STEPS: u32 = 40;
+/// Steps before a root is taken as it is. They stop far earlier; this only
+/// bounds the run time, should rounding make them oscillate.
+const MAX_STEPS: u32 = 20;
 
-/// The u-quantile of the density ∝ (cos − x sin)⁺ e^{−x²}, for cos ≥ 0.
+/// A step of Halley's method for a zero of g = ln `ratio`, from g' and g''/g'.
 ///
-/// The density is log-concave and so is its distribution function
-/// P(x) = (sin e^{−x²} + cos √π erfc(−x)) / 2: Newton's method on ln P steps
-/// to the left of the root at most once, and then rises to it.
+/// Convergence is cubic: after a step below [`enough`] the error is rounding.
+#[inline]
+fn halley<F: Real>(g: F, slope: F, curvature: F) -> F {
+    let newton = g / slope;
+    newton / (F::one() - F::of(0.5) * newton * curvature).max(F::of(0.5))
+}
+
+/// The size of a step after which the next would be lost in rounding.
+#[inline]
+fn enough<F: Real>() -> F {
+    F::of(0.25) * F::epsilon().cbrt()
+}
+
+/// The u-quantile of the density ∝ (cos − x sin)⁺ e^{−x²}, for cos ≥ 0: a zero
+/// of ln P − ln(u P(top)), with the distribution function
+/// P(x) = (sin e^{−x²} + cos √π erfc(−x)) / 2.
 #[inline]
 fn slope_from_above<F: Real>(cos: F, sin: F, u: F) -> F {
-    let (one, half) = (F::one(), F::of(0.5));
+    let (one, two, half) = (F::one(), F::of(2.0), F::of(0.5));
     let root_pi = F::PI().sqrt();
+    // The quantiles of grazing incidence (Rayleigh) and of normal incidence
+    // (Gaussian) enclose the root; it moves from one to the other with cos.
+    let right = (two * u - one).max(F::epsilon() - one).erf_inv();
     let top = if sin > F::zero() {
         cos / sin
     } else {
         F::infinity()
     };
-    let mass = |gauss: F, x: F| half * (sin * gauss + cos * root_pi * (-x).erfc());
-    let total = if top < F::of(1e3) {
-        mass((-top * top).exp(), top)
-    } else {
-        cos * root_pi
-    };
-    let target = u * total;
-    // The quantiles of grazing incidence (Rayleigh) and of normal incidence
-    // (Gaussian) enclose the root; it moves from one to the other with cos.
+    if top >= F::of(1e8) {
+        return right;
+    }
     let left = -(-u.ln()).max(F::zero()).sqrt();
-    let right = (F::of(2.0) * u - one).max(F::epsilon() - one).erf_inv();
+    let mass = |gauss: F, x: F| half * (sin * gauss + cos * root_pi * (-x).erfc());
+    let target = u * mass((-top * top).exp(), top);
     let between = left + cos * (right - left);
     let mut x = if between < top {
         between
@@ -118,8 +129,10 @@ fn slope_from_above<F: Real>(cos: F, sin: F, u: F) -> F {
     };
     for _ in 0..MAX_STEPS {
         let gauss = (-x * x).exp();
-        let p = mass(gauss, x);
-        let next = x - (p / target).ln() * p / ((cos - x * sin) * gauss);
+        let (p, density) = (mass(gauss, x), (cos - x * sin) * gauss);
+        let slope = density / p;
+        let curvature = -sin * gauss / density - two * x - slope;
+        let next = x - halley((p / target).ln(), slope, curvature);
         // Rounding where the density goes to zero can send a step anywhere.
         let next = if next < top {
             next.max(left)
@@ -128,7 +141,7 @@ fn slope_from_above<F: Real>(cos: F, sin: F, u: F) -> F {
         };
         let moved = (next - x).abs();
         x = next;
-        if moved <= F::of(4.0) * F::epsilon() * (one + x.abs()) {
+        if moved <= enough::<F>() * (top - x).min(one) {
             break;
         }
     }
@@ -146,7 +159,7 @@ fn slope_from_below<F: Real>(b: F, u: F) -> F {
     let ln_u = u.ln();
     // Exact in the limits of small and of large b, up to the factor (y + t)/t.
     let mut y = -ln_u / ((b * b - ln_u).sqrt() + b);
-    for _ in 0..MAX_STEPS {
+    for _ in 0..2 * MAX_STEPS {
         let x = b + y;
         let t = x.mills_excess();
         let g = -y * (two * b + y) + (scale * (y + t) / (x + t)).ln() - ln_u;

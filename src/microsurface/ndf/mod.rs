@@ -53,11 +53,17 @@ pub trait Ndf<F: Real>: Copy {
     fn sample_visible(&self, w: Vector3<F>, u: [F; 2]) -> Vector3<F>;
 }
 
+/// √(x² + y²). Where the squares underflow, so does what it is needed for.
+#[inline]
+fn length<F: Real>(x: F, y: F) -> F {
+    (x * x + y * y).sqrt()
+}
+
 /// Turns a vector given in the frame whose x axis is the azimuth of (x, y)
 /// back into the frame that (x, y) is given in.
 #[inline]
 fn rotate_to_azimuth<F: Real>(x: F, y: F, v: Vector3<F>) -> Vector3<F> {
-    let r = x.hypot(y);
+    let r = length(x, y);
     if r == F::zero() {
         return v;
     }

@@ -1,4 +1,4 @@
-use super::{Ndf, Real, Vector3, rotate_to_azimuth};
+use super::{Ndf, Real, Vector3, length, rotate_to_azimuth};
 
 /// D(m) = (2/π) m_z² on the hemisphere: the distribution whose Smith mirror
 /// BRDF is known in closed form to all orders (Dupuy 2026), which makes it the
@@ -60,7 +60,7 @@ impl<F: Real> Ndf<F> for Quadratic {
         // r_z = rise − w_z; 1 − r_z and 1 + r_z by sums of positive terms.
         let low = above * (u[0] / (one + (one - u[0]).sqrt()));
         let r_sin = (low * (two - low)).max(F::zero()).sqrt();
-        let w_sin = w.x.hypot(w.y);
+        let w_sin = length(w.x, w.y);
         // A + B and A − B, with (A + B)(A − B) = rise².
         let r_z = one - low;
         let sum = one + w.z * r_z + w_sin * r_sin;

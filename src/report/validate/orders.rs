@@ -26,7 +26,7 @@ pub struct OrderRow {
     pub tail: f64,
     /// The mean number of facets met.
     pub mean_order: f64,
-    /// The least cap on the order that costs no more than [`CAP_LOSS`].
+    /// The least cap on the order that costs no more than 0.1 % of the light.
     pub cap: u32,
     /// Walks that were made; a share s has the standard error √(s(1 − s)/walks).
     pub walks: u32,

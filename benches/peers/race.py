@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""Races smithwalk against Cycles and Mitsuba 3 on the gold sphere, in one run.
+
+    python3 benches/peers/race.py -o DIR [--bpy DIR] [--mitsuba DIR] [--llvm LIB]
+
+Every renderer is held against its own converged images, so that differences
+between models do not count, noise alone. Two long renders A and B with seeds of
+their own are the reference: the error of an image T is the mean of relMSE(T, A)
+and relMSE(T, B) less relMSE(A, B)/2, which is what the noise of A and B adds.
+Efficiency is relMSE × CPU seconds; less is better. relMSE is that of
+`smithwalk diff`: ε = 0.01, the worst 0.1 % of the pixels left out.
+
+Writes race.csv, one row for each image, which `smithwalk converge --peer`
+reads, and race.md, the table. What is not installed is left out, and said so.
+"""
+
+import argparse
+import csv
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+
+ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
+HERE = os.path.join(ROOT, "benches", "peers")
+SCENE = os.path.join(ROOT, "scenes", "gold_sphere")
+BOUNCES = 12
+
+
+def run(command, **environment):
+    """Run to the end; its standard output. Leaves with what it said when it fails."""
+    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True,
+                          text=True, check=False)
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Worker:
+    """A renderer behind a process that takes a list of jobs."""
+
+    def __init__(self, name, command, **environment):
+        self.name, self.command, self.environment = name, command, environment
+
+    def render(self, jobs, folder):
+        """Render all jobs; returns version and times."""
+        job_file, result_file = (os.path.join(folder, n) for n in ("jobs.json", "results.json"))
+        with open(job_file, "w", encoding="utf-8") as file:
+            json.dump(jobs, file)
+        if os.path.exists(result_file):
+            os.remove(result_file)
+        run(self.command(job_file, result_file), **self.environment)
+        with open(result_file, encoding="utf-8") as file:
+            answer = json.load(file)
+        return answer["version"], answer["results"]
+
+
+class Smithwalk:
+    """This renderer, one process for each image; the times are its own figures."""
+
+    def __init__(self, binary, estimator):
+        self.name, self.binary, self.estimator = f"smithwalk {estimator}", binary, estimator
+
+    def render(self, jobs, _folder):
+        """Render all jobs; returns version and times."""
+        times = []
+        for job in jobs:
+            text = run([self.binary, "render", os.path.join(SCENE, "scene.yaml"), "-o", job["out"],
+                        "--spp", str(job["spp"]), "--seed", str(job["seed"]),
+                        "--estimator", self.estimator])
+            found = re.search(r"spp in ([\d.]+) s \(([\d.]+) s CPU\)", text)
+            times.append({"wall_s": float(found[1]), "cpu_s": float(found[2])})
+        return run([self.binary, "--version"]).strip(), times
+
+
+def contenders(args):
+    """Everyone who can take part, and who can't."""
+    able, missing = [], []
+    for estimator in ("auto", "single", "compensated"):
+        able.append(Smithwalk(args.smithwalk, estimator))
+
+    blend = os.path.join(args.output, "gold_sphere.blend")
+    cycles = os.path.join(HERE, "cycles.py")
+    if shutil.which("blender"):
+        run(["blender", "-b", "--factory-startup", "--python",
+             os.path.join(ROOT, "blender", "scenes", "gold_sphere.py"), "--", blend])
+        for label, distribution in (("GGX", "GGX"), ("Multiscatter GGX", "MULTI_GGX")):
+            able.append(Worker(
+                f"Cycles 3.4 {label}",
+                lambda jobs, results, d=distribution: [
+                    "blender", "-b", blend, "--python", cycles, "--", jobs, results, d, str(BOUNCES)]))
+    else:
+        missing.append("Cycles 3.4: no `blender` on the path")
+    if args.bpy and os.path.exists(blend):
+        able.append(Worker(
+            "Cycles 5.0 Multiscatter GGX",
+            lambda jobs, results: [
+                sys.executable, cycles, blend, jobs, results, "MULTI_GGX", str(BOUNCES)],
+            PYTHONPATH=args.bpy))
+    else:
+        missing.append("Cycles 5.0: --bpy is not given, or there is no blender to make the scene")
+
+    path = {"PYTHONPATH": args.mitsuba} if args.mitsuba else {}
+    probe = subprocess.run([sys.executable, "-c", "import mitsuba"], capture_output=True,
+                           env={**os.environ, **path}, check=False)
+    variants = [("scalar_rgb", "independent")]
+    if args.llvm:
+        path["DRJIT_LIBLLVM_PATH"] = args.llvm
+        variants.append(("llvm_ad_rgb", "multijitter"))
+    else:
+        missing.append("Mitsuba llvm_ad_rgb: --llvm is not given")
+    if probe.returncode:
+        missing.append("Mitsuba: the module can't be imported; try --mitsuba")
+    else:
+        for variant, sampler in variants:
+            able.append(Worker(
+                f"Mitsuba 3 {variant} GGX",
+                lambda jobs, results, v=variant, s=sampler: [
+                    sys.executable, os.path.join(HERE, "mitsuba_worker.py"), SCENE, jobs, results,
+                    v, s, str(BOUNCES)],
+                **path))
+    return able, missing
+
+
+def rel_mse(args, image, reference):
+    """As `smithwalk diff` has it, trimmed."""
+    return json.loads(run([args.smithwalk, "diff", image, reference, "--json"]))["rel_mse_trimmed"]
+
+
+def race(args, contender):
+    """Reference and images of one renderer; its version and a row for each image."""
+    folder = os.path.join(args.output, re.sub(r"\W+", "-", contender.name))
+    os.makedirs(folder, exist_ok=True)
+    references = [{"spp": args.reference_spp, "seed": 101 + i,
+                   "out": os.path.join(folder, f"reference-{i}.exr")} for i in range(2)]
+    images = [{"spp": spp, "seed": seed, "out": os.path.join(folder, f"{spp}-{seed}.exr")}
+              for spp in args.spp for seed in range(1, args.seeds + 1)]
+    version, times = contender.render(references + images, folder)
+    a, b = (job["out"] for job in references)
+    floor = rel_mse(args, a, b) / 2
+    rows = []
+    for job, time in zip(images, times[2:]):
+        error = (rel_mse(args, job["out"], a) + rel_mse(args, job["out"], b)) / 2 - floor
+        rows.append({"name": contender.name, "spp": job["spp"], "seed": job["seed"],
+                     **time, "rel_mse": error, "floor": floor})
+    return version, rows
+
+
+def table(args, versions, rows):
+    """Markdown: figures at the last number of samples, mean over the seeds."""
+    spp = args.spp[-1]
+    lines = [f"| at {spp} spp | version | wall s | CPU s | relative RMSE | relMSE × CPU s | spread |",
+             "|---|---|---|---|---|---|---|"]
+    for name, version in versions.items():
+        mine = [row for row in rows if row["name"] == name and row["spp"] == spp]
+        costs = [row["rel_mse"] * row["cpu_s"] for row in mine]
+
+        def mean(key, mine=mine):
+            return statistics.fmean(row[key] for row in mine)
+
+        spread = statistics.stdev(costs) / statistics.fmean(costs) if len(costs) > 1 else 0.0
+        lines.append(f"| {name} | {version} | {mean('wall_s'):.2f} | {mean('cpu_s'):.2f} "
+                     f"| {max(mean('rel_mse'), 0.0) ** 0.5:.4f} | {statistics.fmean(costs):.2e} "
+                     f"| ± {100 * spread:.0f} % |")
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    """Parse, race, write."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", required=True, help="folder for images and tables")
+    parser.add_argument("--smithwalk", default=os.path.join(ROOT, "target", "release", "smithwalk"))
+    parser.add_argument("--bpy", help="folder with the bpy module, version 5.0")
+    parser.add_argument("--mitsuba", help="folder with the mitsuba module, if not installed")
+    parser.add_argument("--llvm", help="libLLVM.so for Mitsuba's llvm variant")
+    parser.add_argument("--spp", default="16,64", help="samples per pixel, comma-separated")
+    parser.add_argument("--reference-spp", type=int, default=512, help="of each of the two")
+    parser.add_argument("--seeds", type=int, default=3, help="images to average over")
+    parser.add_argument("--only", help="regular expression: names of those who take part")
+    args = parser.parse_args()
+    args.spp = sorted(int(n) for n in args.spp.split(","))
+    args.output = os.path.abspath(args.output)
+    os.makedirs(args.output, exist_ok=True)
+
+    able, missing = contenders(args)
+    versions, rows = {}, []
+    for contender in able:
+        if args.only and not re.search(args.only, contender.name):
+            continue
+        print(f"{contender.name} …", file=sys.stderr, flush=True)
+        versions[contender.name], more = race(args, contender)
+        rows += more
+        # After everyone, so that a late failure loses nothing.
+        with open(os.path.join(args.output, "race.csv"), "w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+    if not rows:
+        sys.exit("nobody takes part")
+    text = table(args, versions, rows)
+    with open(os.path.join(args.output, "race.md"), "w", encoding="utf-8") as file:
+        file.write(text)
+    print(text, end="")
+    for reason in missing:
+        print(f"left out: {reason}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,337 @@
+"""Tests of the exporter: scenes built node by node, exported, and read back.
+
+    blender -b --factory-startup --python blender/test_export.py
+    PYTHONPATH=<bpy> python3 blender/test_export.py
+
+Exits with 1 on a failure. Runs in Blender 3.4, 4.5 and 5.0.
+"""
+
+import math
+import os
+import re
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "scenes"))
+
+import bpy  # noqa: E402
+import common  # noqa: E402
+from smithwalk_export import yaml  # noqa: E402
+from smithwalk_export.scene import export  # noqa: E402
+
+NEW = bpy.app.version >= (4, 0, 0)
+
+
+class ExportTest(unittest.TestCase):
+    """Each test starts from an empty scene with a camera, and exports to a folder of its own."""
+
+    def setUp(self):
+        self.scene = common.empty_scene(64, 48)
+        common.camera(self.scene, (0.0, -6.0, 0.0), (0.0, 0.0, 0.0), 40.0)
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def export(self):
+        """Export; the lines of scene.yaml, without the leading spaces, and the warnings."""
+        self.log = export(self.scene, self.folder.name)
+        with open(self.path("scene.yaml"), encoding="utf-8") as f:
+            self.lines = [line.strip(" -\n") for line in f]
+        return self.lines
+
+    def path(self, name):
+        """A file of the export."""
+        return os.path.join(self.folder.name, name)
+
+    def line(self, start):
+        """The one line that starts so."""
+        found = [line for line in self.lines if line.startswith(start)]
+        self.assertEqual(len(found), 1, f"{start!r} in {self.lines}")
+        return found[0]
+
+    def faces(self, name):
+        """Vertex positions and triangles (position indices, from 0) of an OBJ."""
+        positions, triangles = [], []
+        with open(self.path(name), encoding="ascii") as f:
+            for line in f:
+                words = line.split()
+                if words[0] == "v":
+                    positions.append(tuple(float(w) for w in words[1:]))
+                elif words[0] == "f":
+                    triangles.append(tuple(int(w.split("/")[0]) - 1 for w in words[1:]))
+        return positions, triangles
+
+    def cube(self, **settings):
+        """A cube with a diffuse material."""
+        bpy.ops.mesh.primitive_cube_add(**settings)
+        ob = bpy.context.object
+        ob.data.materials.append(common.diffuse("Grey", (0.5, 0.5, 0.5)))
+        return ob
+
+    def surface(self, node_type, **inputs):
+        """A cube of one shader node; returns material, node."""
+        mat, node = common.material("Test", node_type, **inputs)
+        self.cube().data.materials[0] = mat
+        return mat, node
+
+    # Geometry
+
+    def test_render_visibility_and_subdivision(self):
+        """What is rendered counts, not what the viewport shows."""
+        ob = self.cube()
+        modifier = ob.modifiers.new("s", "SUBSURF")
+        modifier.levels, modifier.render_levels = 0, 2
+        ob.hide_viewport = True
+        self.cube(location=(3.0, 0.0, 0.0)).hide_render = True
+        self.export()
+        self.assertEqual(sum(line.startswith("{name: Cube") for line in self.lines), 1)
+        self.assertEqual(len(self.faces("cube.obj")[1]), 6 * 16 * 2)
+        self.assertEqual(self.log.warnings, [])
+
+    def test_instances_share_a_mesh(self):
+        """A mesh is written once; a mirrored instance keeps its negative determinant."""
+        ob = self.cube()
+        copy = bpy.data.objects.new("Copy", ob.data)
+        copy.scale = (-1.0, 2.0, 1.0)
+        self.scene.collection.objects.link(copy)
+        self.export()
+        self.assertEqual(self.log.counts["meshes"], 1)
+        self.assertEqual(self.log.counts["objects"], 2)
+        self.assertIn("[[-1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]", self.line("{name: Copy"))
+
+    def test_geometry_nodes_instances(self):
+        """Instances made by geometry nodes become objects with matrices of their own."""
+        ob = self.cube()
+        tree = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
+        if NEW:
+            tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+            tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        else:
+            tree.inputs.new("NodeSocketGeometry", "Geometry")
+            tree.outputs.new("NodeSocketGeometry", "Geometry")
+        enter, leave = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+        points = tree.nodes.new("GeometryNodeInstanceOnPoints")
+        cone = tree.nodes.new("GeometryNodeMeshCone")
+        tree.links.new(enter.outputs[0], points.inputs["Points"])
+        tree.links.new(cone.outputs["Mesh"], points.inputs["Instance"])
+        tree.links.new(points.outputs[0], leave.inputs[0])
+        ob.modifiers.new("n", "NODES").node_group = tree
+        self.export()
+        self.assertEqual(self.log.counts["objects"], 8)
+        self.assertEqual(self.log.counts["meshes"], 1)
+
+    def test_curves_and_text_become_triangles(self):
+        """Whatever Blender can turn into a mesh is carried."""
+        bpy.ops.object.text_add()
+        bpy.ops.curve.primitive_bezier_circle_add()
+        bpy.context.object.data.bevel_depth = 0.1
+        self.export()
+        self.assertEqual(self.log.counts["objects"], 2)
+        self.assertEqual(self.log.warnings, [])
+
+    def test_concave_polygons_are_triangulated_as_in_blender(self):
+        """A fan over an L would cover its notch."""
+        corners = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]
+        mesh = bpy.data.meshes.new("L")
+        mesh.from_pydata(corners[1:] + corners[:1], [], [tuple(range(6))])
+        self.scene.collection.objects.link(bpy.data.objects.new("L", mesh))
+        self.export()
+        positions, triangles = self.faces("l.obj")
+        area = 0.0
+        for a, b, c in triangles:
+            (ax, ay, _), (bx, by, _), (cx, cy, _) = positions[a], positions[b], positions[c]
+            signed = ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) / 2.0
+            self.assertGreater(signed, 0.0)
+            area += signed
+        self.assertAlmostEqual(area, 3.0)
+
+    def test_materials_per_face_and_object_slots(self):
+        """Faces go to `usemtl slot_n`; a slot linked to the object overrides the mesh's."""
+        ob = self.cube()
+        ob.data.materials.append(common.diffuse("Red", (1.0, 0.0, 0.0)))
+        ob.data.polygons[3].material_index = 1
+        ob.material_slots[0].link = "OBJECT"
+        ob.material_slots[0].material = common.diffuse("Blue", (0.0, 0.0, 1.0))
+        self.export()
+        self.assertIn("materials: {slot_0: blue, slot_1: red}", self.line("{name: Cube"))
+        with open(self.path("cube.obj"), encoding="ascii") as f:
+            text = f.read()
+        self.assertEqual(re.findall("usemtl (.*)", text), ["slot_0", "slot_1"])
+
+    # Materials
+
+    def test_distributions(self):
+        """Blender's menus against distribution and scattering."""
+        for choice, expected in (("MULTI_GGX", "{roughness: 0.25, color: 0.5}"),
+                                 ("GGX", "{scattering: single, roughness: 0.25, color: 0.5}"),
+                                 ("BECKMANN", "{distribution: beckmann, scattering: single, "
+                                              "roughness: 0.25, color: 0.5}")):
+            self.setUp()
+            _, node = self.surface("ShaderNodeBsdfGlossy", Color=(0.5, 0.5, 0.5), Roughness=0.25)
+            node.distribution = choice
+            self.export()
+            self.assertEqual(self.line("test:"), "test: {conductor: " + expected + "}")
+
+    def test_anisotropy(self):
+        """Anisotropy, rotation and the default tangent, which is radial about z."""
+        _, node = self.surface("ShaderNodeBsdfAnisotropic", Color=(1.0, 1.0, 1.0), Roughness=0.5,
+                               Anisotropy=-0.5, Rotation=0.125)
+        node.distribution = "MULTI_GGX"
+        self.export()
+        self.assertEqual(self.line("test:"),
+                         "test: {conductor: {roughness: 0.5, anisotropy: -0.5, rotation: 0.125, "
+                         "tangent: {radial: z}, color: 1}}")
+
+    def test_glass_emission_and_mix(self):
+        """A mix of glass and emission, through a reroute and with a folded Math factor."""
+        mat, mix = self.surface("ShaderNodeMixShader")
+        tree = mat.node_tree
+        glass, glow, value, math_node, reroute = (tree.nodes.new(n) for n in (
+            "ShaderNodeBsdfGlass", "ShaderNodeEmission", "ShaderNodeValue", "ShaderNodeMath", "NodeReroute"))
+        glass.distribution = "MULTI_GGX"
+        glass.inputs["Roughness"].default_value = 0.5
+        glass.inputs["IOR"].default_value = 1.25
+        glow.inputs["Color"].default_value = (2.0, 1.0, 0.5, 1.0)
+        glow.inputs["Strength"].default_value = 3.0
+        value.outputs[0].default_value = 0.5
+        math_node.operation = "MULTIPLY"
+        math_node.inputs[1].default_value = 0.25
+        tree.links.new(value.outputs[0], math_node.inputs[0])
+        tree.links.new(math_node.outputs[0], mix.inputs[0])
+        tree.links.new(glass.outputs[0], reroute.inputs[0])
+        tree.links.new(reroute.outputs[0], mix.inputs[1])
+        tree.links.new(glow.outputs[0], mix.inputs[2])
+        self.export()
+        self.assertEqual(self.line("test:"),
+                         "test: {mix: {factor: 0.125, a: {dielectric: {roughness: 0.5, ior: 1.25, color: 1}}, "
+                         "b: {emission: {color: [2, 1, 0.5], strength: 3}}}}")
+        self.assertEqual(self.log.warnings, [])
+
+    def test_node_groups_are_looked_into(self):
+        """A shader inside a group, with a colour from the group's input."""
+        mat = bpy.data.materials.new("Test")
+        mat.use_nodes = True
+        tree = mat.node_tree
+        tree.nodes.clear()
+        inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+        if NEW:
+            inner.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+            inner.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+        else:
+            inner.inputs.new("NodeSocketColor", "Tint")
+            inner.outputs.new("NodeSocketShader", "Surface")
+        enter, leave, diffuse = (inner.nodes.new(n) for n in (
+            "NodeGroupInput", "NodeGroupOutput", "ShaderNodeBsdfDiffuse"))
+        inner.links.new(enter.outputs[0], diffuse.inputs["Color"])
+        inner.links.new(diffuse.outputs[0], leave.inputs[0])
+        group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
+        group.node_tree = inner
+        group.inputs[0].default_value = (0.25, 0.5, 0.75, 1.0)
+        tree.links.new(group.outputs[0], output.inputs["Surface"])
+        self.cube().data.materials[0] = mat
+        self.export()
+        self.assertEqual(self.line("test:"), "test: {diffuse: {color: [0.25, 0.5, 0.75]}}")
+
+    def test_textures(self):
+        """A packed image on colour and, by one channel, on roughness; scale and offset."""
+        image = bpy.data.images.new("cells", 4, 4)
+        image.generated_color = (0.25, 0.5, 0.75, 1.0)
+        image.pack()
+        mat, node = self.surface("ShaderNodeBsdfGlossy")
+        node.distribution = "MULTI_GGX"
+        tree = mat.node_tree
+        lookup, split, mapping, uv = (tree.nodes.new(n) for n in (
+            "ShaderNodeTexImage", "ShaderNodeSeparateColor", "ShaderNodeMapping", "ShaderNodeTexCoord"))
+        lookup.image = image
+        mapping.inputs["Scale"].default_value = (2.0, 3.0, 1.0)
+        mapping.inputs["Location"].default_value = (0.5, 0.25, 0.0)
+        tree.links.new(uv.outputs["UV"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs[0], lookup.inputs[0])
+        tree.links.new(lookup.outputs["Color"], node.inputs["Color"])
+        tree.links.new(lookup.outputs["Color"], split.inputs[0])
+        tree.links.new(split.outputs[1], node.inputs["Roughness"])
+        self.export()
+        self.assertEqual(self.line("cells:"), "cells: {file: cells.png, color_space: srgb, "
+                                              "scale: [2, 3], offset: [0.5, 0.25]}")
+        self.assertEqual(self.line("test:"), "test: {conductor: {roughness: {texture: cells, channel: g}, "
+                                             "color: {texture: cells}}}")
+        self.assertTrue(os.path.isfile(self.path("cells.png")))
+        self.assertEqual(self.log.warnings, [])
+
+    def test_principled(self):
+        """Metal turns into Schlick's Fresnel, with the opposite anisotropy."""
+        _, node = self.surface("ShaderNodeBsdfPrincipled", Base_Color=(1.0, 0.75, 0.25), Metallic=1.0,
+                               Roughness=0.5, Anisotropic=0.5)
+        node.distribution = "MULTI_GGX"
+        self.export()
+        aspect = math.sqrt(1.0 - 0.9 * 0.5)
+        self.assertEqual(self.line("test:"),
+                         f"test: {{conductor: {{alpha_x: {yaml.number(0.25 / aspect)}, "
+                         f"alpha_y: {yaml.number(0.25 * aspect)}, tangent: {{radial: z}}, f0: [1, 0.75, 0.25]}}}}")
+        self.assertEqual(self.log.warnings, [])
+
+    def test_losses_are_named(self):
+        """A shader without counterpart: a magenta placeholder, and a warning with material and node."""
+        self.surface("ShaderNodeBsdfTranslucent")
+        self.export()
+        self.assertEqual(self.line("test:"), "test: {diffuse: {color: [1, 0, 1]}}")
+        self.assertEqual(len(self.log.warnings), 1)
+        self.assertRegex(self.log.warnings[0], 'material "Test", node "Translucent BSDF"')
+        self.assertIn("1 thing(s) not carried", self.log.summary())
+
+    def test_procedural_values_are_named(self):
+        """A noise texture on roughness: its default, and a warning."""
+        mat, node = self.surface("ShaderNodeBsdfGlossy", Roughness=0.25)
+        noise = mat.node_tree.nodes.new("ShaderNodeTexNoise")
+        mat.node_tree.links.new(noise.outputs[0], node.inputs["Roughness"])
+        self.export()
+        self.assertIn("roughness: 0.25", self.line("test:"))
+        self.assertRegex(self.log.warnings[0], 'material "Test", node "Glossy BSDF": Roughness comes from node "Noise')
+
+    # Lights, camera, settings
+
+    def test_light_node_tree_and_power(self):
+        """A constant Emission node multiplies power and colour."""
+        self.cube()
+        light = common.area_light(self.scene, "Key", (0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (2.0, 1.0), 100.0)
+        light.data.use_nodes = True
+        emission = next(n for n in light.data.node_tree.nodes if n.type == "EMISSION")
+        emission.inputs["Strength"].default_value = 0.5
+        emission.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
+        self.export()
+        line = self.line("{area:")
+        self.assertIn("power: 50", line)
+        self.assertIn("color: [1, 0.5, 0.25]", line)
+        self.assertIn("shape: {rectangle: {width: 2, height: 1}}", line)
+        self.assertEqual(self.line("light_units:"), f"light_units: cycles_{4 if NEW else 3}")
+
+    def test_focus_object_and_resolution(self):
+        """The focus distance is along the view axis; the percentage scales the resolution."""
+        target = self.cube(location=(2.0, -2.0, 1.0))
+        dof = self.scene.camera.data.dof
+        dof.use_dof, dof.focus_object, dof.aperture_fstop = True, target, 2.0
+        self.scene.render.resolution_percentage = 50
+        self.export()
+        self.assertEqual(self.line("depth_of_field:"), "depth_of_field: {fstop: 2, focus_distance: 4}")
+        self.assertEqual((self.line("width:"), self.line("height:")), ("width: 32", "height: 24"))
+
+    def test_settings_are_restored(self):
+        """The export leaves the scene as it was."""
+        self.cube()
+        before = (self.scene.render.engine, self.scene.render.use_compositing)
+        self.export()
+        self.assertEqual((self.scene.render.engine, self.scene.render.use_compositing), before)
+
+    def test_names_are_quoted(self):
+        """YAML's own words and signs are quoted."""
+        for text, expected in (("plain", "plain"), ("yes", '"yes"'), ("a: b", '"a: b"'), ("1", '"1"'),
+                               ('say "hi"', '"say \\"hi\\""'), ("", '""'), ("Würfel", '"Würfel"')):
+            self.assertEqual(yaml.flow(text), expected)
+
+
+if __name__ == "__main__":
+    outcome = unittest.TextTestRunner(verbosity=2).run(
+        unittest.defaultTestLoader.loadTestsFromTestCase(ExportTest))
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0 if outcome.wasSuccessful() else 1)
