@@ -98,7 +98,9 @@ pub enum Purpose {
 /// requests matters.
 #[derive(Clone, Debug)]
 pub struct Sampler {
-    /// Hash of seed and pixel, and of the sequence when there is a second one.
+    /// Hash of seed and pixel.
+    pixel_key: u64,
+    /// The same, with the number of the sequence when there is a second one.
     key: u64,
     /// Index into the Sobol sequence.
     index: u32,
@@ -113,13 +115,26 @@ impl Sampler {
     /// left of the full image, so that a crop shows the same noise).
     pub fn new(seed: u64, pixel: [u32; 2], sample: u32) -> Self {
         let pixel = u64::from(pixel[0]) | (u64::from(pixel[1]) << 32);
-        let sequence = u64::from(sample >> LOG2_SEQUENCE);
-        Self {
-            key: mix(mix(mix(seed) ^ pixel).wrapping_add(sequence)),
-            index: sample & ((1 << LOG2_SEQUENCE) - 1),
+        let mut sampler = Self {
+            pixel_key: mix(mix(seed) ^ pixel),
+            key: 0,
+            index: 0,
             cached_set: u32::MAX,
             cached: [0.0; 4],
-        }
+        };
+        sampler.set_index(sample);
+        sampler
+    }
+
+    /// Goes on with another sample of the pixel, for all dimensions that are
+    /// drawn from now on: paths that share their first vertices are samples
+    /// of their own behind those.
+    #[inline]
+    pub fn set_index(&mut self, sample: u32) {
+        let sequence = u64::from(sample >> LOG2_SEQUENCE);
+        self.key = mix(self.pixel_key.wrapping_add(sequence));
+        self.index = sample & ((1 << LOG2_SEQUENCE) - 1);
+        self.cached_set = u32::MAX;
     }
 
     /// One number in [0, 1).
@@ -146,19 +161,20 @@ impl Sampler {
         self.set(dimension.set)
     }
 
-    /// The stream of a microsurface walk at vertex `bounce`: four stratified
-    /// numbers, and any number of independent ones after them.
+    /// The stream of microsurface walks at vertex `bounce`.
     #[inline]
     pub fn walk_stream(&mut self, bounce: u32, purpose: Purpose) -> WalkStream {
         let set = match purpose {
             Purpose::Sample => Dimension::bsdf(bounce).set,
             Purpose::Light => Dimension::vertex(bounce, 3, 0).set,
         };
-        let tail_key = self.set_key(set) ^ (u64::from(self.index) << 32);
         WalkStream {
-            lead: self.set(set),
-            drawn: 0,
-            tail: Pcg32::new(mix(tail_key), self.key),
+            key: self.set_key(set),
+            index: self.index,
+            numbers: [0.0; 4],
+            left: 0,
+            sets: 0,
+            tail: None,
         }
     }
 
@@ -177,26 +193,55 @@ impl Sampler {
     }
 }
 
-/// The random numbers of one microsurface walk, in [0, 1).
+/// Sets of four stratified numbers that a walk has: enough for two orders.
+const WALK_SETS: u32 = 2;
+
+/// The random numbers of microsurface walks at one vertex, in [0, 1): stratified
+/// ones for the first orders of each, and any number of independent ones after
+/// them. Nothing is computed before it is asked for.
 #[derive(Clone, Debug)]
 pub struct WalkStream {
-    /// The stratified numbers that come first.
-    lead: [f32; 4],
-    /// How many of them are used up.
-    drawn: usize,
-    tail: Pcg32,
+    key: u64,
+    index: u32,
+    /// The current set; the last `left` are still to come.
+    numbers: [f32; 4],
+    left: usize,
+    /// Sets begun by this walk.
+    sets: u32,
+    tail: Option<Pcg32>,
 }
 
 impl WalkStream {
     /// The next number, with 23 random bits or more; never 1.
     #[inline]
     pub fn next_f32(&mut self) -> f32 {
-        if let Some(&lead) = self.lead.get(self.drawn) {
-            self.drawn += 1;
-            return lead;
+        if self.left == 0 {
+            if self.sets == WALK_SETS {
+                return self.next_of_tail();
+            }
+            self.next_set();
         }
+        self.left -= 1;
+        self.numbers[3 - self.left]
+    }
+
+    #[inline]
+    fn next_set(&mut self) {
+        if self.sets > 0 {
+            self.key = mix(self.key);
+        }
+        self.numbers = sobol_4d(self.index, self.key);
+        self.left = 4;
+        self.sets += 1;
+    }
+
+    fn next_of_tail(&mut self) -> f32 {
+        let (key, index) = (self.key, u64::from(self.index));
+        let tail = self
+            .tail
+            .get_or_insert_with(|| Pcg32::new(mix(key ^ (index << 32)), key));
         // The 24 bits that a f32 below 1 can hold, hence never rounded up to 1.
-        (self.tail.next_u32() >> 8) as f32 * (1.0 / (1 << 24) as f32)
+        (tail.next_u32() >> 8) as f32 * (1.0 / (1 << 24) as f32)
     }
 }
 
@@ -204,6 +249,15 @@ impl crate::microsurface::Draw<f32> for WalkStream {
     #[inline]
     fn draw(&mut self) -> f32 {
         self.next_f32()
+    }
+
+    #[inline]
+    fn next_walk(&mut self) {
+        // Sets of its own, under other keys than those that are used up.
+        self.key = mix(self.key ^ u64::from(u32::MAX));
+        self.left = 0;
+        self.sets = 0;
+        self.tail = None;
     }
 }
 
@@ -323,7 +377,9 @@ mod tests {
 
     /// The first number of a walk behind the stratified ones.
     fn tail_start(mut walk: WalkStream) -> f32 {
-        walk.drawn = walk.lead.len();
+        for _ in 0..4 * WALK_SETS {
+            walk.next_f32();
+        }
         walk.next_f32()
     }
 

@@ -118,7 +118,8 @@ fn what_is_left_out_has_the_documented_default() {
             spp: 64,
             seed: 0,
             max_bounces: 12,
-            roulette_start: 5,
+            roulette_start: 8,
+            branches: 4,
             estimator: auto
         }
     );

@@ -93,8 +93,17 @@ pub struct Sampling {
     pub max_bounces: u32,
     /// The first bounce at which Russian roulette may end a path.
     pub roulette_start: u32,
+    /// Into how many branches a path splits at its first surface, on average
+    /// over the image: more where it is noisy. 1 is plain path tracing.
+    pub branches: u32,
     /// How multiple scattering is estimated.
     pub estimator: Estimator,
+}
+
+impl Sampling {
+    /// The most branches per path: past these, the numbers of one pixel's
+    /// branches would soon fill a u32.
+    pub const MOST_BRANCHES: u32 = 64;
 }
 
 impl Default for Sampling {
@@ -103,7 +112,8 @@ impl Default for Sampling {
             spp: 64,
             seed: 0,
             max_bounces: 12,
-            roulette_start: 5,
+            roulette_start: 8,
+            branches: 4,
             estimator: Estimator::Auto,
         }
     }

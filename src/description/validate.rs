@@ -351,6 +351,13 @@ impl Check<'_> {
                 "expected at least 1 sample per pixel, found 0".to_owned(),
             );
         }
+        if !(1..=Sampling::MOST_BRANCHES).contains(&sampling.branches) {
+            let (most, found) = (Sampling::MOST_BRANCHES, sampling.branches);
+            self.report(
+                at.key("branches"),
+                format!("expected 1 to {most} branches per path, found {found}"),
+            );
+        }
     }
 
     fn world(&mut self, world: &World, at: At) {

@@ -10,6 +10,7 @@
 //! [`Film::develop`] turns sums into an [`Image`], which [`OutputPath`] writes
 //! as EXR or PNG and [`read_exr`] reads back.
 
+mod branches;
 mod exr;
 mod filter;
 mod image;

@@ -2,7 +2,7 @@
 //!
 //! Layout, all little-endian: the magic bytes and the version; the fingerprint
 //! of what is rendered (u64); resolution and window (6 × u32); the AOVs' bits
-//! (u8); then per tile its colour sums (per pixel 6 × f64, 6 × f32, 2 × u32),
+//! (u8); then per tile its colour sums (per pixel 6 × f64, 6 × f32, 3 × u32),
 //! its AOV sums (f64), and its faults (per cause a u64 count, a u32 number of
 //! pixels and 2 × u32 each); last a checksum of all that (u64).
 
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::tile::{FAULT_PIXELS, Fault};
 use super::{AovSet, Film, OutputError, Window, output};
 
-const MAGIC: &[u8; 16] = b"smithwalk film\0\x02";
+const MAGIC: &[u8; 16] = b"smithwalk film\0\x03";
 
 /// Why a saved film can't be taken up again.
 #[derive(Debug, thiserror::Error)]
@@ -80,8 +80,9 @@ impl Film {
                 for value in color.milestone.iter().chain(&color.moved) {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
-                bytes.extend_from_slice(&color.count.to_le_bytes());
-                bytes.extend_from_slice(&color.left_out.to_le_bytes());
+                for value in [color.count, color.left_out, color.branches] {
+                    bytes.extend_from_slice(&value.to_le_bytes());
+                }
             }
             for value in &tile.sums {
                 bytes.extend_from_slice(&value.to_le_bytes());
@@ -195,6 +196,7 @@ impl Reader<'_> {
                 }
                 color.count = self.u32()?;
                 color.left_out = self.u32()?;
+                color.branches = self.u32()?;
             }
             for value in &mut tile.sums {
                 *value = self.f64()?;

@@ -1,6 +1,7 @@
 //! The accumulators of a tile of pixels.
 
 use super::{Aov, AovSet, Window};
+use crate::metrics::REL_EPSILON;
 
 /// Pixel positions that are remembered per cause of a fault.
 pub(super) const FAULT_PIXELS: usize = 8;
@@ -126,6 +127,8 @@ pub(super) struct ColorSum {
     pub count: u32,
     /// Samples left out for a [`Fault`] of their colour.
     pub left_out: u32,
+    /// See [`FilmTile::branches`].
+    pub branches: u32,
 }
 
 /// A rectangle of pixels and their accumulators, in f64.
@@ -260,6 +263,25 @@ impl FilmTile {
             let deviations = color.squares[channel] - sum * sum / n;
             deviations.max(0.0) / (n * (n - 1.0))
         })
+    }
+
+    /// The mean over the channels of the variance of one sample, over the squared
+    /// mean with an ε as in [`crate::metrics`].
+    pub(super) fn relative_variance(&self, pixel: [u32; 2]) -> f64 {
+        let samples = f64::from(self.samples(pixel));
+        let terms = self.color(pixel).into_iter().zip(self.variance(pixel));
+        let relative = terms.map(|(mean, v)| v * samples / (mean * mean + REL_EPSILON));
+        relative.sum::<f64>() / 3.0
+    }
+
+    /// Into how many branches the paths of `pixel` split; 0 as long as
+    /// [`super::Film::plan_branches`] has not decided.
+    pub fn branches(&self, pixel: [u32; 2]) -> u32 {
+        self.colors[self.window.index(pixel)].branches
+    }
+
+    pub(super) fn set_branches(&mut self, pixel: [u32; 2], branches: u32) {
+        self.colors[self.window.index(pixel)].branches = branches;
     }
 
     /// An estimate of the variance of [`Self::color`] that is far too uncertain

@@ -1,6 +1,8 @@
 //! One camera path: unidirectional path tracing with a light sample at every
 //! vertex, combined with BSDF sampling by the balance heuristic.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::bsdf::{ByOrder, Layers};
@@ -61,7 +63,58 @@ impl PathResult {
     }
 }
 
+/// A path on its way.
+#[derive(Clone)]
+struct Path {
+    ray: Ray,
+    throughput: Rgb,
+    /// Whether some surface has scattered it more than once.
+    multiple: bool,
+    last: Vertex,
+    /// Surfaces met, which address random numbers.
+    vertex: u32,
+    /// Those of them that scattered it.
+    bounce: u32,
+    /// Distance from the ray's start to the surface that scatters next.
+    travelling: f32,
+}
+
+impl Path {
+    fn from_camera(ray: Ray) -> Self {
+        Self {
+            ray,
+            throughput: Rgb::ONE,
+            multiple: false,
+            last: Vertex {
+                position: ray.origin,
+                pdf: None,
+                travelled: 0.0,
+            },
+            vertex: 0,
+            bounce: 0,
+            travelling: 0.0,
+        }
+    }
+
+    /// Straight on behind a surface met at distance `t`.
+    fn pass_through(&mut self, surface: &Surface, t: f32) {
+        self.vertex += 1;
+        self.last.travelled += t;
+        self.ray = surface.spawn(self.ray.direction);
+    }
+
+    fn deposit(&self, radiance: &mut ByOrder, light: Rgb) {
+        let light = self.throughput * light;
+        if self.multiple {
+            radiance.multiple += light;
+        } else {
+            radiance.single += light;
+        }
+    }
+}
+
 /// The last vertex that light samples could have continued from.
+#[derive(Clone)]
 struct Vertex {
     position: Vec3,
     /// Density of the direction taken, sr⁻¹; `None` where no light sample
@@ -96,120 +149,146 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
     }
 
-    /// The light that arrives along `ray` at the camera.
-    pub fn trace(&self, mut ray: Ray, sampler: &mut Sampler) -> PathResult {
+    /// The light that arrives along `ray` at the camera. From the first surface
+    /// that scatters on, the path goes on in several ways, the average of which
+    /// counts; each draws the numbers of another `branches` index from `sampler`.
+    pub fn trace(&self, ray: Ray, sampler: &mut Sampler, branches: Range<u32>) -> PathResult {
         let mut result = PathResult::default();
-        let mut throughput = Rgb::ONE;
-        let mut multiple = false;
-        let mut last = Vertex {
-            position: ray.origin,
-            pdf: None,
-            travelled: 0.0,
+        let mut trunk = Path::from_camera(ray);
+        let Some(surface) = self.next_surface(&mut trunk, &mut result) else {
+            return result;
         };
-        // Surfaces met, which address random numbers, and those of them that scattered.
-        let mut vertex = 0;
-        let mut bounce = 0;
+        let layers = self.scene.layers(&surface);
+        let share = 1.0 / branches.len() as f32;
+        for index in branches {
+            sampler.set_index(index);
+            let mut path = trunk.clone();
+            let mut rest = PathResult::default();
+            let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler, &mut rest);
+            while goes_on {
+                let Some(surface) = self.next_surface(&mut path, &mut rest) else {
+                    break;
+                };
+                let layers = self.scene.layers(&surface);
+                goes_on = self.scatter(&mut path, &surface, &layers, sampler, &mut rest);
+            }
+            result.radiance += rest.radiance * Rgb::splat(share);
+            result.rays += rest.rays;
+        }
+        result
+    }
+
+    /// Follows the path to the next surface that may scatter it, and takes up
+    /// the light on the way; `None` when the path ends.
+    fn next_surface(&self, path: &mut Path, result: &mut PathResult) -> Option<Surface> {
         loop {
-            let camera = bounce == 0;
+            let camera = path.bounce == 0;
             result.rays += 1;
-            let hit = self.scene.accelerator.intersect(ray);
-            let mut emitted = self.analytic_lights(&ray, hit.map(|h| h.t), &last, camera);
+            let hit = self.scene.accelerator.intersect(path.ray);
+            let t_far = hit.map(|h| h.t);
+            let mut emitted = self.analytic_lights(&path.ray, t_far, &path.last, camera);
             let Some(hit) = hit else {
-                emitted += self.world(&last, ray.direction);
-                deposit(&mut result.radiance, throughput * emitted, multiple);
-                break;
+                emitted += self.world(&path.last, path.ray.direction);
+                path.deposit(&mut result.radiance, emitted);
+                return None;
             };
-            let surface = self.scene.surface::<F>(&ray, &hit);
+            let surface = self.scene.surface::<F>(&path.ray, &hit);
             if has::<F>(Features::HIDDEN_OBJECTS)
                 && camera
-                && vertex < MAX_STRAIGHT
+                && path.vertex < MAX_STRAIGHT
                 && !self.scene.objects[surface.object].visible_to_camera
             {
-                deposit(&mut result.radiance, throughput * emitted, multiple);
-                vertex += 1;
-                last.travelled += hit.t;
-                ray = surface.spawn(ray.direction);
+                path.deposit(&mut result.radiance, emitted);
+                path.pass_through(&surface, hit.t);
                 continue;
             }
             if has::<F>(Features::EMISSIVE_MESHES) {
-                emitted += self.surface_emission(&surface, &last);
+                emitted += self.surface_emission(&surface, &path.last);
             }
-            deposit(&mut result.radiance, throughput * emitted, multiple);
-            if self.describe_first && result.first.is_none() {
+            path.deposit(&mut result.radiance, emitted);
+            if self.describe_first && camera && result.first.is_none() {
                 let material = &self.scene.materials[surface.material];
                 result.first = Some(FirstHit {
                     albedo: material.albedo(&self.scene.textures, surface.uv),
                     normal: surface.normal,
-                    distance: last.travelled + hit.t,
+                    distance: path.last.travelled + hit.t,
                 });
             }
-            let layers = self.scene.layers(&surface);
-            if bounce > self.scene.max_bounces {
-                // No more scattering, but what goes straight through still arrives.
-                throughput *= layers.transparency();
-                vertex += 1;
-                if !has::<F>(Features::TRANSPARENCY)
-                    || throughput == Rgb::ZERO
-                    || vertex > MAX_STRAIGHT
-                {
-                    break;
-                }
-                last.travelled += hit.t;
-                ray = surface.spawn(ray.direction);
-                continue;
+            if path.bounce <= self.scene.max_bounces {
+                path.travelling = hit.t;
+                return Some(surface);
             }
-            let wo = -ray.direction;
-            if has::<F>(Features::LIGHT_SAMPLING) && layers.has_smooth() {
-                let direct = self.direct(&surface, &layers, wo, vertex, sampler, &mut result.rays);
-                if multiple {
-                    result.radiance.multiple += throughput * direct.total();
-                } else {
-                    result.radiance += direct * throughput;
-                }
+            // No more scattering, but what goes straight through still arrives.
+            if !has::<F>(Features::TRANSPARENCY) || path.vertex >= MAX_STRAIGHT {
+                return None;
             }
+            path.throughput *= self.scene.layers(&surface).transparency();
+            if path.throughput == Rgb::ZERO {
+                return None;
+            }
+            path.pass_through(&surface, hit.t);
+        }
+    }
 
-            let choice = if has::<F>(Features::MIXES) {
-                sampler.get_1d(Dimension::closure_choice(vertex))
+    /// Light samples at a surface, and the direction in which the path goes on;
+    /// false when it ends.
+    fn scatter(
+        &self,
+        path: &mut Path,
+        surface: &Surface,
+        layers: &Layers,
+        sampler: &mut Sampler,
+        result: &mut PathResult,
+    ) -> bool {
+        let wo = -path.ray.direction;
+        let vertex = path.vertex;
+        if has::<F>(Features::LIGHT_SAMPLING) && layers.has_smooth() {
+            let direct = self.direct(surface, layers, wo, vertex, sampler, &mut result.rays);
+            if path.multiple {
+                result.radiance.multiple += path.throughput * direct.total();
             } else {
-                0.0
-            };
-            let mut stream = sampler.walk_stream(vertex, Purpose::Sample);
-            let Some(sample) = layers.sample(wo, choice, &mut stream) else {
-                break;
-            };
-            vertex += 1;
-            throughput *= sample.weight;
-            ray = surface.spawn(sample.wi);
-            if has::<F>(Features::TRANSPARENCY) && sample.straight {
-                // Goes on as if nothing had been there.
-                if vertex > MAX_STRAIGHT {
-                    break;
-                }
-                last.travelled += hit.t;
-                continue;
-            }
-            multiple |= sample.order > 1;
-            let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
-                Some(layers.pdf(wo, sample.wi))
-            } else {
-                None
-            };
-            last = Vertex {
-                position: surface.position,
-                pdf,
-                travelled: 0.0,
-            };
-            bounce += 1;
-
-            if bounce >= self.scene.roulette_start {
-                let survival = throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
-                if sampler.get_1d(Dimension::roulette(vertex)) >= survival {
-                    break;
-                }
-                throughput /= survival;
+                result.radiance += direct * path.throughput;
             }
         }
-        result
+
+        let choice = if has::<F>(Features::MIXES) {
+            sampler.get_1d(Dimension::closure_choice(vertex))
+        } else {
+            0.0
+        };
+        let mut stream = sampler.walk_stream(vertex, Purpose::Sample);
+        let Some(sample) = layers.sample(wo, choice, &mut stream) else {
+            return false;
+        };
+        path.throughput *= sample.weight;
+        if has::<F>(Features::TRANSPARENCY) && sample.straight {
+            // Goes on as if nothing had been there.
+            path.pass_through(surface, path.travelling);
+            return path.vertex <= MAX_STRAIGHT;
+        }
+        path.vertex += 1;
+        path.ray = surface.spawn(sample.wi);
+        path.multiple |= sample.order > 1;
+        let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
+            Some(layers.pdf(wo, sample.wi))
+        } else {
+            None
+        };
+        path.last = Vertex {
+            position: surface.position,
+            pdf,
+            travelled: 0.0,
+        };
+        path.bounce += 1;
+
+        if path.bounce >= self.scene.roulette_start {
+            let survival = path.throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
+            if sampler.get_1d(Dimension::roulette(path.vertex)) >= survival {
+                return false;
+            }
+            path.throughput /= survival;
+        }
+        true
     }
 
     /// What the lights without geometry add along a ray up to `t_far`.
@@ -288,7 +367,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let factor = if light.delta {
             1.0 / light.pdf
         } else {
-            1.0 / (light.pdf + pdf)
+            light.pdf / (light.pdf * light.pdf + pdf * pdf)
         };
         let mut stream = sampler.walk_stream(vertex, Purpose::Light);
         let value = layers.eval(wo, light.direction, &mut stream);
@@ -339,16 +418,8 @@ impl Vertex {
     /// that light sampling would have found with density `light_pdf` (sr⁻¹).
     fn weight(&self, light_pdf: f32) -> f32 {
         match self.pdf {
-            Some(pdf) => pdf / (pdf + light_pdf),
+            Some(pdf) => pdf * pdf / (pdf * pdf + light_pdf * light_pdf),
             None => 1.0,
         }
-    }
-}
-
-fn deposit(radiance: &mut ByOrder, light: Rgb, multiple: bool) {
-    if multiple {
-        radiance.multiple += light;
-    } else {
-        radiance.single += light;
     }
 }

@@ -1,5 +1,6 @@
 //! Passes over the film, in parallel over its tiles, until a limit is reached.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -69,6 +70,10 @@ pub struct RenderReport {
 /// The least samples per pixel before an error estimate is believed.
 const MIN_SPP_FOR_NOISE: u32 = 16;
 
+/// Samples per pixel with equally many branches everywhere, from which their
+/// further allocation is decided.
+const PILOT_SAMPLES: u32 = 4;
+
 /// Between two looks at the clock, at most this share of the time limit.
 const TIME_SLICE: f64 = 0.05;
 
@@ -79,6 +84,18 @@ pub(super) struct Job<'a> {
     first: u32,
     count: u32,
     describe_first: bool,
+}
+
+impl Job<'_> {
+    /// The branches of sample number `index`, counted through the samples of a
+    /// pixel that has been given `planned` of them after its pilot samples.
+    fn branches(&self, planned: u32, index: u32) -> Range<u32> {
+        let mean = self.request.scene.branches;
+        let piloted = index.min(PILOT_SAMPLES);
+        let first = piloted * mean + (index - piloted) * planned;
+        let count = if index < PILOT_SAMPLES { mean } else { planned };
+        first..first + count
+    }
 }
 
 /// What to render, and how far.
@@ -140,7 +157,12 @@ pub fn render(
             stop = Stop::Time;
             break;
         }
-        let count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
+        let mut count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
+        if spp < PILOT_SAMPLES {
+            count = count.min(PILOT_SAMPLES - spp);
+        } else if spp == PILOT_SAMPLES {
+            film.plan_branches(request.scene.branches);
+        }
         let job = Job {
             request,
             first: spp,
@@ -219,6 +241,7 @@ fn render_sample<const F: u32>(
         ..
     } = *job.request;
     let mut sampler = Sampler::new(seed, pixel, index);
+    let branches = job.branches(tile.branches(pixel), index);
     let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
     let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
     let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
@@ -229,7 +252,7 @@ fn render_sample<const F: u32>(
     let ray = camera.ray(raster, lens);
     // Depth counts along the view axis, not along the ray.
     let depth_scale = ray.direction.dot(camera.forward());
-    let result = tracer.trace(ray, &mut sampler);
+    let result = tracer.trace(ray, &mut sampler, branches);
     tile.add(pixel, &result.to_sample(depth_scale));
     result.rays
 }

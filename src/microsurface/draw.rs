@@ -12,6 +12,10 @@ use rand::Rng;
 pub trait Draw<F> {
     /// The next number.
     fn draw(&mut self) -> F;
+
+    /// Says that the numbers from here on are for another walk, whose first ones
+    /// tell the most again.
+    fn next_walk(&mut self) {}
 }
 
 /// A random generator as a source of uniform numbers. The topmost 24 bits

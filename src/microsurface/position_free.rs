@@ -6,6 +6,8 @@
 //! which descending, climbing and escaping act in closed form. A step costs
 //! time in proportion to the steps down so far.
 
+use smallvec::SmallVec;
+
 use super::two_walk::kept_inside;
 use super::walk::survives;
 use super::{At, Draw, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
@@ -17,8 +19,11 @@ use super::{At, Draw, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3
 /// Its Laplace transform is L(s) = Σ_i start_i Π_{j ≥ i} rate_j/(s + rate_j):
 /// every term is positive, so nothing cancels.
 struct Depth<F> {
-    stages: Vec<Stage<F>>,
+    stages: SmallVec<[Stage<F>; COMMON]>,
 }
+
+/// Stages that are kept without an allocation: steps down of most walks.
+const COMMON: usize = 12;
 
 struct Stage<F> {
     start: F,
@@ -28,7 +33,7 @@ struct Stage<F> {
 impl<F: Real> Depth<F> {
     fn new() -> Self {
         Self {
-            stages: Vec::with_capacity(16),
+            stages: SmallVec::new(),
         }
     }
 
@@ -100,6 +105,7 @@ impl<N, I> Microsurface<N, I> {
         tally.add(1, self.first_order(self.entrance(wi), wo, wi));
         let mut depth = Depth::new();
         self.eval_directions(wi, wo, F::one(), &mut depth, rng, tally);
+        rng.next_walk();
         self.eval_directions(wo, wi, wo.z / wi.z, &mut depth, rng, tally);
     }
 

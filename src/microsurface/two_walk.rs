@@ -83,6 +83,7 @@ impl<N, I> Microsurface<N, I> {
         // f(ω_i, ω_o) |cosθ_o| over f(ω_o, ω_i) |cosθ_i|
         let swap = index * index * wo.z.abs() / wi.z;
         self.eval_half(wi, wo, swap, None, rng, tally);
+        rng.next_walk();
         if crosses {
             let other = Self {
                 ndf: self.ndf,

@@ -96,6 +96,8 @@ pub struct Scene {
     pub max_bounces: u32,
     /// Russian roulette starts at this bounce.
     pub roulette_start: u32,
+    /// Into how many branches a path splits at its first surface, on average.
+    pub branches: u32,
 }
 
 impl Scene {

@@ -152,6 +152,7 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
         features: Features::NONE,
         max_bounces: description.sampling.max_bounces,
         roulette_start: description.sampling.roulette_start,
+        branches: description.sampling.branches,
     };
     scene.features = features(&scene);
     Ok(Resolved { scene, repairs })
