@@ -171,8 +171,10 @@ pub struct Summary {
     pub worst_row: String,
     /// The largest score.
     pub score: f64,
-    /// The mean of the squared scores: about 1 where nothing but noise is
-    /// between the two.
+    /// The mean of the squared scores: where nothing but noise is between the
+    /// two 1.07 to 1.15 (Student), with a standard deviation of at most
+    /// 1.84/√count. Tests ask for less than 1.5 of 330 and 660 rows, and 1.8
+    /// of 60: 3.4 and 2.7 deviations, for fixed seeds and fixed tables.
     pub chi_square: f64,
     /// The largest standard error.
     pub error: f64,
