@@ -36,7 +36,7 @@ mod transport;
 pub use check::{Case, Check, Statement};
 pub use grid::Effort;
 pub use model::{Distribution, Model, Rng, Smithwalk, stream, uniform};
-pub use orders::OrderRow;
+pub use orders::{OrderRow, table as order_table};
 pub use precision::PrecisionRow;
 pub use statistics::FALSE_ALARM;
 

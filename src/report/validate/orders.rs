@@ -24,6 +24,9 @@ pub struct OrderRow {
     pub shares: [f64; 4],
     /// Share of the light that meets 5 facets or more.
     pub tail: f64,
+    /// Share of the light that meets more than 10: what the cap that renderers
+    /// have would lose.
+    pub beyond_ten: f64,
     /// The mean number of facets met.
     pub mean_order: f64,
     /// The least cap on the order that costs no more than 0.1 % of the light.
@@ -54,6 +57,7 @@ fn row<M: Model, I: Facets<f64>>(
         counts[order - 1] += 1.0 / f64::from(walks);
     }
     let share = |k: usize| counts.get(k).copied().unwrap_or(0.0);
+    let beyond_order = |k: usize| counts.iter().skip(k).fold(0.0, |sum, c| sum + c);
     let mut beyond = 0.0;
     let mut cap = counts.len();
     while cap > 1 && beyond + counts[cap - 1] <= CAP_LOSS {
@@ -65,7 +69,8 @@ fn row<M: Model, I: Facets<f64>>(
         alpha,
         cos,
         shares: [share(0), share(1), share(2), share(3)],
-        tail: counts.iter().skip(4).fold(0.0, |sum, c| sum + c),
+        tail: beyond_order(4),
+        beyond_ten: beyond_order(10),
         mean_order: (1..).zip(&counts).map(|(k, c)| f64::from(k) * c).sum(),
         cap: cap as u32,
         walks,

@@ -72,15 +72,15 @@ pub fn text(report: &Report) -> String {
     );
     let _ = writeln!(
         out,
-        "{:<15} {:>5} {:>5}  {:>7} {:>7} {:>7} {:>7} {:>7}  {:>6} {:>4}",
-        "facets", "α", "cosθ", "1", "2", "3", "4", "≥ 5", "mean", "cap"
+        "{:<15} {:>5} {:>5}  {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}  {:>6} {:>4}",
+        "facets", "α", "cosθ", "1", "2", "3", "4", "≥ 5", "> 10", "mean", "cap"
     );
     for row in &report.orders {
         let OrderRow {
             facets, alpha, cos, ..
         } = row;
         let _ = write!(out, "{facets:<15} {alpha:>5} {cos:>5} ");
-        for share in row.shares.iter().chain([&row.tail]) {
+        for share in row.shares.iter().chain([&row.tail, &row.beyond_ten]) {
             let _ = write!(out, " {share:>7.4}");
         }
         let _ = writeln!(out, "  {:>6.3} {:>4}", row.mean_order, row.cap);
@@ -194,13 +194,14 @@ pub fn html(report: &Report) -> String {
         "3",
         "4",
         "≥ 5",
+        "> 10",
         "mean order",
         "cap",
     ];
     row(&mut out, "th", "", &titles.map(String::from));
     for r in &report.orders {
         let mut cells = vec![r.facets.to_owned(), r.alpha.to_string(), r.cos.to_string()];
-        let shares = r.shares.iter().chain([&r.tail]);
+        let shares = r.shares.iter().chain([&r.tail, &r.beyond_ten]);
         cells.extend(shares.map(|s| format!("{s:.4}")));
         cells.extend([format!("{:.3}", r.mean_order), r.cap.to_string()]);
         row(&mut out, "td", "", &cells);
