@@ -73,7 +73,13 @@ impl<F: Real> Facets<F> for Dielectric<F> {
         }
         // Micro-normals point up.
         let m = h * (if h.z < F::zero() { -length } else { length }).recip();
-        let cos = at.w.dot(m);
+        // By reflection |w + o| = 2 w·m, which rounding at grazing angles can't
+        // make zero or negative, as it can the scalar product.
+        let cos = if crosses {
+            at.w.dot(m)
+        } else {
+            F::of(0.5) * length
+        };
         if cos <= F::zero() || m.z <= F::zero() {
             return Phase::none();
         }

@@ -61,9 +61,9 @@ impl<F: Real> Ndf<F> for Quadratic {
         let low = above * (u[0] / (one + (one - u[0]).sqrt()));
         let r_sin = (low * (two - low)).max(F::zero()).sqrt();
         let w_sin = length(w.x, w.y);
-        // A + B and A − B, with (A + B)(A − B) = rise².
-        let r_z = one - low;
-        let sum = one + w.z * r_z + w_sin * r_sin;
+        // A + B and A − B, with (A + B)(A − B) = rise²; A = 1 + w_z r_z from
+        // what w_z is above −1 and r_z below 1, as both may be small.
+        let sum = low + above * (one - low) + w_sin * r_sin;
         let difference = if sum > F::zero() {
             rise * rise / sum
         } else {
