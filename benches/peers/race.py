@@ -87,6 +87,8 @@ def contenders(args):
     if shutil.which("blender"):
         run(["blender", "-b", "--factory-startup", "--python",
              os.path.join(ROOT, "blender", "scenes", "gold_sphere.py"), "--", blend])
+        if not os.path.exists(blend):
+            sys.exit(f"blender made no {blend}")
         for label, distribution in (("GGX", "GGX"), ("Multiscatter GGX", "MULTI_GGX")):
             able.append(Worker(
                 f"Cycles 3.4 {label}",
