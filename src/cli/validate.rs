@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use serde_json::json;
-use smithwalk::report::validate::{Effort, Smithwalk, validate};
+use smithwalk::report::validate::{Effort, validate};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -32,7 +32,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     } else {
         Effort::Full
     };
-    let report = validate(Smithwalk, effort, &mut |statement| {
+    let report = validate(effort, &mut |statement| {
         let verdict = if statement.passed() { "holds" } else { "FAILS" };
         // A log that can't be written to is no reason to stop.
         let _ = writeln!(

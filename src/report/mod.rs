@@ -1,4 +1,4 @@
-//! Reports: the model's statements with figures, and the surface it stands for.
+//! Reports: what was measured, as tables, figures and pages.
 
 pub mod converge;
 pub mod heightfield;

@@ -5,7 +5,8 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
-/// Width and height of a chart, in pixels of the SVG's view box.
+/// Width and height of a chart without its legend, in pixels of the SVG's view
+/// box.
 const SIZE: (u32, u32) = (720, 420);
 
 /// Colours that keep apart for colour-blind readers (Okabe and Ito 2008).
@@ -171,6 +172,11 @@ impl Series {
         }
     }
 
+    /// The colour of the series that is number `index` of its chart.
+    fn color(&self, index: usize) -> RGBColor {
+        COLORS[self.color.unwrap_or(index) % COLORS.len()]
+    }
+
     /// The same in the palette's colour `index`.
     pub fn colored(mut self, index: usize) -> Self {
         self.color = Some(index);
@@ -212,6 +218,16 @@ impl Chart {
         })
     }
 
+    /// Room for the names of the series, in pixels: a letter of the legend's
+    /// font is about 7 wide.
+    fn legend_width(&self) -> u32 {
+        let names = self.series.iter().map(|s| s.name.chars().count());
+        match names.max() {
+            None | Some(0) => 0,
+            Some(longest) => 40 + 7 * longest as u32,
+        }
+    }
+
     fn draw<X, Y>(&self, x: X, y: Y) -> Result<String, Box<dyn std::error::Error>>
     where
         X: AsRangedCoord<Value = f64>,
@@ -221,12 +237,13 @@ impl Chart {
     {
         let mut svg = String::new();
         {
-            let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            let size = (SIZE.0 + self.legend_width(), SIZE.1);
+            let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
             area.fill(&WHITE)?;
             let mut chart = ChartBuilder::on(&area)
                 .caption(&self.title, ("sans-serif", 18))
                 .margin(12)
-                .margin_right(24)
+                .margin_right(16 + self.legend_width())
                 .x_label_area_size(46)
                 .y_label_area_size(70)
                 .build_cartesian_2d(x, y)?;
@@ -242,7 +259,7 @@ impl Chart {
                 .bold_line_style(BLACK.mix(0.12))
                 .draw()?;
             for (index, series) in self.series.iter().enumerate() {
-                let color = COLORS[series.color.unwrap_or(index) % COLORS.len()];
+                let color = series.color(index);
                 let style = color.stroke_width(2);
                 let shown = || {
                     let points = series.points.iter();
@@ -250,23 +267,11 @@ impl Chart {
                 };
                 let line = || shown().map(|p| (p.x, p.y));
                 let mark = series.mark;
-                let mut named = !series.name.is_empty();
                 if mark == Mark::Dashes {
-                    let drawn = chart.draw_series(DashedLineSeries::new(line(), 6, 4, style))?;
-                    if std::mem::take(&mut named) {
-                        drawn.label(&series.name).legend(move |(x, y)| {
-                            let ends = [(x, y), (x + 20, y)];
-                            DashedPathElement::new(ends, 6, 4, style)
-                        });
-                    }
+                    chart.draw_series(DashedLineSeries::new(line(), 6, 4, style))?;
                 }
                 if matches!(mark, Mark::Line | Mark::Both) {
-                    let drawn = chart.draw_series(LineSeries::new(line(), style))?;
-                    if std::mem::take(&mut named) {
-                        drawn
-                            .label(&series.name)
-                            .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
-                    }
+                    chart.draw_series(LineSeries::new(line(), style))?;
                 }
                 if matches!(mark, Mark::Points | Mark::Both) {
                     chart.draw_series(shown().filter(|p| p.error > 0.0).map(|p| {
@@ -275,23 +280,29 @@ impl Chart {
                         let low = if self.y.shows(low) { low } else { p.y };
                         ErrorBar::new_vertical(p.x, low, p.y, p.y + p.error, color.filled(), 6)
                     }))?;
-                    let dots = line().map(|p| Circle::new(p, 3, color.filled()));
-                    let drawn = chart.draw_series(dots)?;
-                    if named {
-                        drawn
-                            .label(&series.name)
-                            .legend(move |(x, y)| Circle::new((x + 10, y), 3, color.filled()));
-                    }
+                    chart.draw_series(line().map(|p| Circle::new(p, 3, color.filled())))?;
                 }
             }
-            if self.series.iter().any(|s| !s.name.is_empty()) {
-                chart
-                    .configure_series_labels()
-                    .position(SeriesLabelPosition::UpperRight)
-                    .background_style(WHITE.mix(0.85))
-                    .border_style(BLACK.mix(0.3))
-                    .label_font(("sans-serif", 13))
-                    .draw()?;
+            // The legend stands beside the chart, where it hides nothing.
+            let named = self.series.iter().enumerate();
+            let named = named.filter(|(_, s)| !s.name.is_empty());
+            for (row, (index, series)) in named.enumerate() {
+                let color = series.color(index);
+                let style = color.stroke_width(2);
+                let (x, y) = (SIZE.0 as i32, 54 + 20 * row as i32);
+                let ends = [(x, y), (x + 24, y)];
+                match series.mark {
+                    Mark::Dashes => {
+                        area.draw(&DashedPathElement::new(ends, 6, 4, style))?;
+                    }
+                    Mark::Line | Mark::Both => area.draw(&PathElement::new(ends, style))?,
+                    Mark::Points => {}
+                }
+                if matches!(series.mark, Mark::Points | Mark::Both) {
+                    area.draw(&Circle::new((x + 12, y), 3, color.filled()))?;
+                }
+                let font = ("sans-serif", 13);
+                area.draw(&Text::new(series.name.clone(), (x + 30, y - 6), font))?;
             }
             area.present()?;
         }

@@ -12,11 +12,23 @@ use std::f64::consts::TAU;
 /// The relative standard error that the full effort reaches for every pair.
 pub const PRECISION: f64 = 3e-4;
 
-/// Pairs of directions, above 1° from the horizon.
-fn pairs(count: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+/// The least cosine of the directions of a pair. Connections of a walk from one
+/// end are rare and high where the other end grazes: there its means would take
+/// too long to become normal.
+fn least_cosine(estimator: Estimator) -> f64 {
+    match estimator {
+        Estimator::Walk => 0.1,
+        Estimator::TwoWalk | Estimator::PositionFree => 0.02,
+    }
+}
+
+/// Pairs of directions with cosines above `least`.
+fn pairs(count: usize, least: f64) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let mut rng: Rng = stream(12, 0);
-    let mut direction =
-        || Vector3::spherical(0.02 + 0.98 * uniform(&mut rng), TAU * uniform(&mut rng));
+    let mut direction = || {
+        let cos = least + (1.0 - least) * uniform(&mut rng);
+        Vector3::spherical(cos, TAU * uniform(&mut rng))
+    };
     (0..count).map(|_| (direction(), direction())).collect()
 }
 
@@ -62,8 +74,9 @@ fn measure<M: Model>(
     index: usize,
 ) -> Mean {
     const PILOT: u32 = 512;
-    // The sampler's own limit.
-    const MOST: u32 = 1 << 16;
+    // The length of the sampler's sequence; past it a new one begins.
+    const SEQUENCE: u32 = 1 << 16;
+    const MOST: u32 = 1 << 20;
     let run = |samples, first_seed| {
         let mut means = Mean::default();
         for replicate in 0..REPLICATES {
@@ -77,7 +90,9 @@ fn measure<M: Model>(
             };
             let mut sum = 0.0;
             for i in 0..samples {
-                (points.index, points.dimension) = (i, 0);
+                (points.index, points.dimension) = (i % SEQUENCE, 0);
+                // The hash of seeds makes every sequence another scrambling.
+                points.seed = seed ^ (i / SEQUENCE) << 26;
                 let mut total = Total::default();
                 model.eval(surface, estimator, wi, wo, &mut points, &mut total);
                 sum += total.0.0[0];
@@ -99,11 +114,12 @@ pub fn closed_form<M: Model>(model: M, effort: Effort) -> Result<Statement, Plot
         ndf: model.ndf(Distribution::Quadratic),
         facets: model.conductor(),
     };
-    let pairs = pairs(effort.pick(40, 500));
+    let count = effort.pick(40, 500);
     let precision = effort.pick(5e-3, PRECISION);
     let mut checks = Vec::new();
     for estimator in [Estimator::Walk, Estimator::TwoWalk, Estimator::PositionFree] {
-        let measured = pairs.par_iter().enumerate().map(|(i, &pair)| {
+        let measured = pairs(count, least_cosine(estimator));
+        let measured = measured.par_iter().enumerate().map(|(i, &pair)| {
             let mean = measure(model, &surface, estimator, pair, precision, i);
             let name = format!("cosθ {:.3} to {:.3}", pair.0.z, pair.1.z);
             let exact = Quadratic::mirror_all_orders(pair.0, pair.1);
@@ -124,6 +140,7 @@ pub fn closed_form<M: Model>(model: M, effort: Effort) -> Result<Statement, Plot
             errors,
         ));
     }
+    let pairs = pairs(count, 0.02);
     let first = pairs.iter().map(|&(wi, wo)| {
         let single = surface.eval_single(wi, wo, &mut stream(121, 0)).0[0];
         let name = format!("cosθ {:.3} to {:.3}", wi.z, wo.z);

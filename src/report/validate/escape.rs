@@ -192,11 +192,11 @@ pub fn two_directions<M: Model>(model: M, effort: Effort) -> Result<Statement, P
     })
 }
 
-/// Two directions on the side of the normal.
-type Directions = (Vector3<f64>, Vector3<f64>);
+/// Where light comes from and goes to.
+type Ends = (Vector3<f64>, Vector3<f64>);
 
 /// Distributions with pairs of views.
-fn pairs(effort: Effort) -> Vec<(Distribution, Directions)> {
+fn pairs(effort: Effort) -> Vec<(Distribution, Ends)> {
     let views = effort.views();
     cross(&effort.distributions(), &cross(&views, &views))
 }

@@ -11,9 +11,9 @@
 //! that the fault is found.
 //!
 //! ```no_run
-//! use smithwalk::report::validate::{Effort, Smithwalk, validate};
+//! use smithwalk::report::validate::{Effort, validate};
 //!
-//! let report = validate(Smithwalk, Effort::Quick, &mut |_| ())?;
+//! let report = validate(Effort::Quick, &mut |_| ())?;
 //! assert!(report.passed());
 //! std::fs::write("validate.html", report.to_html())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -22,6 +22,7 @@
 mod check;
 mod closed;
 mod escape;
+mod explicit;
 mod grid;
 mod model;
 mod orders;
@@ -39,8 +40,20 @@ pub use orders::OrderRow;
 pub use precision::PrecisionRow;
 pub use statistics::FALSE_ALARM;
 
+use super::heightfield::HeightFieldError;
 use super::plot::PlotError;
 use serde::Serialize;
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ValidateError {
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The explicit surface could not be traced.
+    #[error(transparent)]
+    HeightField(#[from] HeightFieldError),
+}
 
 /// All that a validation found.
 #[derive(Clone, Debug, Serialize)]
@@ -77,7 +90,8 @@ impl Report {
     }
 }
 
-/// Tests one statement; `None` if there is none of this number here.
+/// Tests one statement about `model`. `None` for 10 and 11, which [`validate`]
+/// tests on an explicit surface, and for numbers that are none.
 pub fn statement<M: Model>(
     model: M,
     effort: Effort,
@@ -99,15 +113,21 @@ pub fn statement<M: Model>(
 }
 
 /// Tests everything; `progress` hears of each statement as it is done.
-pub fn validate<M: Model>(
-    model: M,
+pub fn validate(
     effort: Effort,
     progress: &mut dyn FnMut(&Statement),
-) -> Result<Report, PlotError> {
+) -> Result<Report, ValidateError> {
     let start = std::time::Instant::now();
     let mut statements = Vec::new();
-    for found in (1..=12).filter_map(|number| statement(model, effort, number)) {
-        let found = found?;
+    for number in 1..=12 {
+        let found = match number {
+            10 => explicit::heights(effort)?,
+            11 => explicit::lobes(effort)?,
+            _ => match statement(Smithwalk, effort, number) {
+                Some(found) => found?,
+                None => continue,
+            },
+        };
         progress(&found);
         statements.push(found);
     }
@@ -116,8 +136,8 @@ pub fn validate<M: Model>(
         statements,
         precision: precision::check(&precision_table),
         precision_table,
-        orders: orders::table(model, effort),
-        lobes: orders::lobes(model, effort)?,
+        orders: orders::table(Smithwalk, effort),
+        lobes: orders::lobes(Smithwalk, effort)?,
         seconds: start.elapsed().as_secs_f64(),
     })
 }

@@ -20,6 +20,10 @@ const STEP: f64 = 1e-5;
 /// onset of total reflection keep the quadrature from being better.
 const INTEGRAL: f64 = 1e-6;
 
+/// How well the share of a cell of normals is to be known: to a small part of
+/// one count.
+const CELL: f64 = 1e-6;
+
 /// The law of reflection.
 fn reflected(w: Vector3<f64>, m: Vector3<f64>) -> Option<Vector3<f64>> {
     Some((m * (2.0 * w.dot(m)) - w).normalized())
@@ -41,8 +45,12 @@ fn cross_product(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
     )
 }
 
-/// dω/dm of a law, by central differences on the sphere.
-fn spread(law: impl Fn(Vector3<f64>) -> Option<Vector3<f64>>, m: Vector3<f64>) -> Option<f64> {
+/// dω/dm of a law, by central differences on the sphere over `step`.
+fn spread(
+    law: impl Fn(Vector3<f64>) -> Option<Vector3<f64>>,
+    m: Vector3<f64>,
+    step: f64,
+) -> Option<f64> {
     let helper = if m.x.abs() < 0.6 {
         Vector3::new(1.0, 0.0, 0.0)
     } else {
@@ -52,10 +60,10 @@ fn spread(law: impl Fn(Vector3<f64>) -> Option<Vector3<f64>>, m: Vector3<f64>) -
     let b = cross_product(m, a);
     let slope = |t: Vector3<f64>| {
         let (ahead, behind) = (
-            law((m + t * STEP).normalized())?,
-            law((m - t * STEP).normalized())?,
+            law((m + t * step).normalized())?,
+            law((m - t * step).normalized())?,
         );
-        Some((ahead - behind) * (0.5 / STEP))
+        Some((ahead - behind) * (0.5 / step))
     };
     Some(cross_product(slope(a)?, slope(b)?).length())
 }
@@ -88,11 +96,18 @@ fn implied<N: Ndf<f64>, I: Facets<f64>>(
     let mirror = |m| reflected(at.w, m);
     let through = |m| refracted(at.w, m, eta);
     let transmitted = if I::TRANSMITS {
-        value(through(m), true, spread(through, m))
+        // Refraction bends ever more towards the critical angle.
+        let cos = at.w.dot(m);
+        let cos2 = 1.0 - (1.0 - cos * cos) / (eta * eta);
+        let step = STEP * cos2.clamp(f64::EPSILON, 1.0);
+        value(through(m), true, spread(through, m, step))
     } else {
         0.0
     };
-    [value(mirror(m), false, spread(mirror, m)), transmitted]
+    [
+        value(mirror(m), false, spread(mirror, m, STEP)),
+        transmitted,
+    ]
 }
 
 /// Facets that light from `w` meets.
@@ -178,7 +193,7 @@ impl Visit for Scattering {
         let mut expected = Vec::new();
         for part in 0..2 {
             let density = |m| implied(&at.ndf, &at.facets, from, at.eta, m)[part];
-            expected.extend(slopes.integrate_cells(density));
+            expected.extend(slopes.integrate_cells(CELL, density));
         }
         let samples = self.samples as f64;
         expected.iter_mut().for_each(|e| *e *= samples);
@@ -207,7 +222,9 @@ fn normals<M: Model>(model: M, effort: Effort) -> Vec<Case> {
     let tested = all.par_iter().enumerate().map(|(index, &(d, w))| {
         let ndf = model.ndf(d);
         let slopes = Slopes::seen(d, w);
-        let mut expected = slopes.integrate_cells(|m| m.dot(w).max(0.0) * ndf.density(m));
+        let mut expected = slopes.integrate_cells(CELL * d.projected_area(w), |m| {
+            m.dot(w).max(0.0) * ndf.density(m)
+        });
         let sigma: f64 = expected.iter().sum();
         expected
             .iter_mut()

@@ -142,9 +142,9 @@ impl Slopes {
         (part * Self::SIDE + i.min(Self::SIDE - 1)) * Self::SIDE + j.min(Self::SIDE - 1)
     }
 
-    /// ∫ g(m) dm over each cell.
-    pub fn integrate_cells(&self, mut g: impl FnMut(Vector3<f64>) -> f64) -> Vec<f64> {
-        let rule = gauss(8);
+    /// ∫ g(m) dm over each cell, to about `tolerance`.
+    pub fn integrate_cells(&self, tolerance: f64, g: impl Fn(Vector3<f64>) -> f64) -> Vec<f64> {
+        let rules = [gauss(5), gauss(8)];
         let side = Self::SIDE as f64;
         let mut sums = vec![0.0; Self::CELLS];
         for (part, (.., last)) in self.parts().into_iter().enumerate() {
@@ -155,17 +155,46 @@ impl Slopes {
                 for j in 0..Self::SIDE {
                     let edge = |k: usize| last * k as f64 / side;
                     let across = |k: usize| 2.0 * k as f64 / side - 1.0;
-                    let sum = &mut sums[(part * Self::SIDE + i) * Self::SIDE + j];
-                    self.rectangle(
+                    sums[(part * Self::SIDE + i) * Self::SIDE + j] = self.refined(
                         part,
-                        (edge(i), edge(i + 1)),
-                        (across(j), across(j + 1)),
-                        &rule,
-                        &mut |m, dm| *sum += dm * g(m),
+                        [(edge(i), edge(i + 1)), (across(j), across(j + 1))],
+                        &rules,
+                        (tolerance, 0),
+                        &g,
                     );
                 }
             }
         }
         sums
+    }
+
+    /// ∫ g(m) dm over a rectangle; where two rules disagree, as they do where
+    /// total reflection sets in, over its quarters.
+    fn refined(
+        &self,
+        part: usize,
+        [s, t]: [(f64, f64); 2],
+        rules: &[Vec<(f64, f64)>; 2],
+        (tolerance, depth): (f64, u32),
+        g: &impl Fn(Vector3<f64>) -> f64,
+    ) -> f64 {
+        const DEEPEST: u32 = 5;
+        let [coarse, fine] = [0, 1].map(|k| {
+            let mut sum = 0.0;
+            self.rectangle(part, s, t, &rules[k], &mut |m, dm| sum += dm * g(m));
+            sum
+        });
+        if depth == DEEPEST || (fine - coarse).abs() <= tolerance {
+            return fine;
+        }
+        let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
+        let halves = |r: (f64, f64)| [(r.0, middle(r)), (middle(r), r.1)];
+        let mut sum = 0.0;
+        for s in halves(s) {
+            for t in halves(t) {
+                sum += self.refined(part, [s, t], rules, (0.5 * tolerance, depth + 1), g);
+            }
+        }
+        sum
     }
 }

@@ -12,27 +12,34 @@ use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
+/// The least |ln η| at which refraction bends light enough. With less, light
+/// goes nearly straight on, and its phase function is a peak at any roughness.
+const LEAST_BEND: f64 = 0.3;
+
 /// Whether the walk's estimates for fixed directions have tails light enough
 /// for normal scores: its connections are as high as the lobe of a facet, which
 /// refraction makes narrower.
-fn wide<I: Facets<f64>>(d: Distribution, _: &I) -> bool {
-    d.alpha().0.min(d.alpha().1) >= if I::TRANSMITS { 1.0 } else { 0.5 }
+fn wide<I: Facets<f64>>(d: Distribution, _: &I, bend: f64) -> bool {
+    let least = if I::TRANSMITS { 1.0 } else { 0.5 };
+    d.alpha().0.min(d.alpha().1) >= least && bend >= LEAST_BEND
 }
 
 /// Runs `$body` with `$facets` as all the model's facets in turn; collects.
+/// `$bend` is |ln η|, ∞ for those that do not refract.
 macro_rules! each_facets {
-    ($model:expr, $effort:expr, |$name:ident, $facets:ident| $body:expr) => {{
+    ($model:expr, $effort:expr, |$name:ident, $facets:ident, $bend:ident| $body:expr) => {{
         let mut all = Vec::new();
         {
-            let ($name, $facets) = ("mirror".to_owned(), $model.conductor());
+            let ($name, $facets, $bend) = ("mirror".to_owned(), $model.conductor(), f64::INFINITY);
             all.extend($body);
         }
         {
-            let ($name, $facets) = ("diffuse".to_owned(), $model.diffuse());
+            let ($name, $facets, $bend) = ("diffuse".to_owned(), $model.diffuse(), f64::INFINITY);
             all.extend($body);
         }
         for &eta in $effort.indices() {
-            let ($name, $facets) = (format!("η {eta:.2}"), $model.dielectric(eta));
+            let name = format!("η {eta:.2}");
+            let ($name, $facets, $bend) = (name, $model.dielectric(eta), eta.ln().abs());
             all.extend($body);
         }
         all
@@ -51,10 +58,11 @@ fn estimators<I: Facets<f64>>() -> &'static [Estimator] {
 /// Whether an integral of evaluations has tails light enough for normal scores
 /// with [`Proposal`]: either higher orders have wide lobes, or there are hardly
 /// any. What walks carry out is tested everywhere.
-fn tame<I: Facets<f64>>(d: Distribution, w: Vector3<f64>, _: &I) -> bool {
+fn tame<I: Facets<f64>>(d: Distribution, w: Vector3<f64>, _: &I, bend: f64) -> bool {
     let (x, y) = d.alpha();
     let tan = (1.0 - w.z * w.z).max(0.0).sqrt() / w.z;
-    x.min(y) >= if I::TRANSMITS { 0.5 } else { 0.2 } || x.max(y) * tan <= 0.5
+    let least = if I::TRANSMITS { 0.5 } else { 0.2 };
+    (x.min(y) >= least && bend >= LEAST_BEND) || x.max(y) * tan <= 0.5
 }
 
 /// Directions to evaluate in: a mixture of uniform ones, of the first bounce,
@@ -200,13 +208,15 @@ fn zones<M: Model, I: Facets<f64>>(
 pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotError> {
     let samples = effort.pick(4_000, 16_000);
     let all: Vec<_> = effort.views_of_all().into_iter().enumerate().collect();
-    let energy = each_facets!(model, effort, |name, facets| {
-        let tame = all.par_iter().filter(|(_, (d, w))| tame(*d, *w, &facets));
+    let energy = each_facets!(model, effort, |name, facets, bend| {
+        let tame = all
+            .par_iter()
+            .filter(|(_, (d, w))| tame(*d, *w, &facets, bend));
         let cases = tame.flat_map_iter(|&(i, (d, w))| {
             let proposal = Proposal::new(model, d, facets);
             let used = estimators_of(&facets)
                 .iter()
-                .filter(move |&&e| e != Estimator::Walk || wide(d, &facets));
+                .filter(move |&&e| e != Estimator::Walk || wide(d, &facets, bend));
             let name = name.clone();
             used.map(move |&estimator| {
                 let mut rng = stream(6, i);
@@ -217,8 +227,10 @@ pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, Pl
         });
         cases.collect::<Vec<_>>()
     });
-    let carried = each_facets!(model, effort, |name, facets| {
-        let tame = all.par_iter().filter(|(_, (d, w))| tame(*d, *w, &facets));
+    let carried = each_facets!(model, effort, |name, facets, bend| {
+        let tame = all
+            .par_iter()
+            .filter(|(_, (d, w))| tame(*d, *w, &facets, bend));
         let cases = tame.flat_map_iter(|&(i, (d, w))| {
             let proposal = Proposal::new(model, d, facets);
             let name = format!("{name}, {}, cosθ {:.2}", d.name(), w.z);
@@ -226,7 +238,7 @@ pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, Pl
         });
         cases.collect::<Vec<_>>()
     });
-    let kept = each_facets!(model, effort, |name, facets| {
+    let kept = each_facets!(model, effort, |name, facets, _bend| {
         let cases = all.par_iter().map(|&(i, (d, w))| {
             let surface = Microsurface {
                 ndf: model.ndf(d),
@@ -418,13 +430,13 @@ pub fn reciprocal<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotE
     let samples = effort.pick(5_000, 40_000);
     let pairs = [(0.9, 0.3), (0.2, 0.6), (0.5, 0.5), (0.8, -0.4), (0.4, -0.7)];
     let pairs = pairs.map(|(a, b)| (Vector3::spherical(a, 0.2), Vector3::spherical(b, 2.5)));
-    let estimates = each_facets!(model, effort, |name, facets| {
+    let estimates = each_facets!(model, effort, |name, facets, bend| {
         let pairs = pairs
             .iter()
             .filter(|(_, wo)| wo.z > 0.0 || transmits(&facets));
         let jobs: Vec<_> = distributions
             .iter()
-            .filter(|&&d| wide(d, &facets))
+            .filter(|&&d| wide(d, &facets, bend))
             .flat_map(|&d| pairs.clone().map(move |&p| (d, p)))
             .enumerate()
             .collect();
@@ -539,26 +551,28 @@ pub fn single_scattering<M: Model>(model: M, effort: Effort) -> Result<Statement
         }
         mean
     };
-    let shares = each_facets!(model, effort, |name, facets| {
-        let cases = all.par_iter().map(|&(i, (d, wi))| {
+    let shares = each_facets!(model, effort, |name, facets, _bend| {
+        let cases = all.par_iter().filter_map(|&(i, (d, wi))| {
             let surface = Microsurface {
                 ndf: model.ndf(d),
                 facets,
             };
             let mut rng = stream(80, i);
             let (mut left, mut weighted) = (Mean::default(), Mean::default());
-            for _ in 0..4 * samples {
+            for _ in 0..samples {
                 let exit = model.sample(&surface, wi, &mut rng);
                 left.add(exit.map_or(0.0, |e| if e.order == 1 { e.weight.0[0] } else { 0.0 }));
                 let single = surface.sample_single(wi, &mut rng);
                 weighted.add(single.map_or(0.0, |e| e.weight.0[0]));
             }
             let name = format!("{name}, {}, cosθ {:.2}", d.name(), wi.z);
-            Case::new(name, left.score_against(&weighted))
+            // A share, of which too few walks have the other fate, is not normal.
+            let rare = samples as f64 * weighted.mean.min(1.0 - weighted.mean);
+            (rare > 50.0).then(|| Case::new(name, left.score_against(&weighted)))
         });
         cases.collect::<Vec<_>>()
     });
-    let values = each_facets!(model, effort, |name, facets| {
+    let values = each_facets!(model, effort, |name, facets, _bend| {
         let cases = all.par_iter().filter_map(|&(i, (d, wi))| {
             let surface = Microsurface {
                 ndf: model.ndf(d),
