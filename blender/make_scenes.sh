@@ -1,7 +1,7 @@
 #!/bin/sh
 # Rebuild scenes/: .blend by script (Blender 3.4), export, Cycles references.
 #
-#   blender/make_scenes.sh [gold_sphere|suzanne|sphere_rows|furnace]...
+#   blender/make_scenes.sh [gold_sphere|suzanne|sphere_rows|furnace|interior|rough_glass|brushed_metal|gallery]...
 #
 # Needs `blender` 3.4 on PATH, and for the references of 4.5 BPY45, a folder
 # with the bpy 4.5 module (pip install --no-deps --target DIR bpy==4.5.15, and
@@ -62,8 +62,14 @@ furnace() {
     cycles45 furnace multi_ggx --spp 64 --seed 1
 }
 
+# Without references: benches/peers and benches/gallery.py render them.
+interior() { build interior; }
+rough_glass() { build rough_glass; }
+brushed_metal() { build brushed_metal; }
+gallery() { build gallery; }
+
 if [ $# -eq 0 ]; then
-    set -- gold_sphere suzanne sphere_rows furnace
+    set -- gold_sphere suzanne sphere_rows furnace interior rough_glass brushed_metal gallery
 fi
 for scene; do
     "$scene"

@@ -56,9 +56,10 @@ impl Drop for Folder {
 }
 
 /// The film's estimate comes from the spread of the samples as if they were
-/// independent; they are stratified, so the true error may only be smaller. The
-/// bounds were set before the seeds were drawn: 3072 channels of kurtosis below
-/// 100 put the standard error of the true relMSE at a tenth at most.
+/// independent; they are stratified, so the true error may only be smaller, by
+/// about a tenth here. Below, the bound allows for chance: 3072 channels of
+/// kurtosis below 30 put the standard error of the true relMSE at a tenth at
+/// most, hence of the error itself at 0.05.
 #[test]
 fn the_noise_estimate_agrees_with_the_true_error() {
     let scene = small_scene();
@@ -73,7 +74,7 @@ fn the_noise_estimate_agrees_with_the_true_error() {
             let ratio = estimated / actual;
             println!("{spp} spp: estimated {estimated:.5}, true {actual:.5}, ratio {ratio:.3}");
             assert!(
-                (0.85..2.0).contains(&ratio),
+                (0.85..1.3).contains(&ratio),
                 "{spp} spp: {estimated} for {actual}"
             );
         }

@@ -52,7 +52,9 @@ class Worker:
             json.dump(jobs, file)
         if os.path.exists(result_file):
             os.remove(result_file)
-        run(self.command(job_file, result_file), **self.environment)
+        said = run(self.command(job_file, result_file), **self.environment)
+        if not os.path.exists(result_file):
+            sys.exit(f"{self.name} ended without results:\n{said}")
         with open(result_file, encoding="utf-8") as file:
             answer = json.load(file)
         return answer["version"], answer["results"]
@@ -83,15 +85,22 @@ def contenders(args):
         able.append(Smithwalk(args.smithwalk, estimator))
 
     blend = os.path.join(args.output, "gold_sphere.blend")
-    cycles = os.path.join(HERE, "cycles.py")
-    if shutil.which("blender"):
-        run(["blender", "-b", "--factory-startup", "--python",
-             os.path.join(ROOT, "blender", "scenes", "gold_sphere.py"), "--", blend])
+    cycles = os.path.join(HERE, "cycles_worker.py")
+    blender = shutil.which("blender")
+    if blender:
+        # Debian's Blender takes its numpy from the first python3 on the path,
+        # which may be another one that runs this script.
+        system = {"PATH": os.defpath}
+        run([blender, "-b", "--factory-startup", "--python",
+             os.path.join(ROOT, "blender", "scenes", "gold_sphere.py"), "--", blend], **system)
+        if not os.path.exists(blend):
+            sys.exit(f"blender made no {blend}")
         for label, distribution in (("GGX", "GGX"), ("Multiscatter GGX", "MULTI_GGX")):
             able.append(Worker(
                 f"Cycles 3.4 {label}",
                 lambda jobs, results, d=distribution: [
-                    "blender", "-b", blend, "--python", cycles, "--", jobs, results, d, str(BOUNCES)]))
+                    blender, "-b", blend, "--python", cycles, "--", jobs, results, d, str(BOUNCES)],
+                **system))
     else:
         missing.append("Cycles 3.4: no `blender` on the path")
     if args.bpy and os.path.exists(blend):
@@ -174,7 +183,7 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", required=True, help="folder for images and tables")
     parser.add_argument("--smithwalk", default=os.path.join(ROOT, "target", "release", "smithwalk"))
-    parser.add_argument("--bpy", help="folder with the bpy module, version 5.0")
+    parser.add_argument("--bpy", help="PYTHONPATH of the bpy module, version 5.0, with a numpy below 2")
     parser.add_argument("--mitsuba", help="folder with the mitsuba module, if not installed")
     parser.add_argument("--llvm", help="libLLVM.so for Mitsuba's llvm variant")
     parser.add_argument("--spp", default="16,64", help="samples per pixel, comma-separated")

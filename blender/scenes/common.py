@@ -79,6 +79,26 @@ def plane(name, size, location=(0.0, 0.0, 0.0)):
     return ob
 
 
+def box(name, location, size, bevel=0.0):
+    """A cuboid; `size` is (x, y, z) in metres, `bevel` the radius of its edges."""
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=location)
+    ob = bpy.context.object
+    ob.name = ob.data.name = name
+    ob.scale = size
+    bpy.ops.object.transform_apply(location=False, rotation=False)
+    if bevel:
+        modifier = ob.modifiers.new("Bevel", "BEVEL")
+        modifier.width, modifier.segments = bevel, 3
+    return ob
+
+
+def smooth(ob):
+    """Interpolate the normals of all faces."""
+    for polygon in ob.data.polygons:
+        polygon.use_smooth = True
+    return ob
+
+
 def material(name, node_type, **inputs):
     """A material of one shader node; returns it and the node.
 

@@ -3,6 +3,10 @@
 use super::{Curve, Point};
 use crate::report::plot::{Axis, Chart, Mark, Series};
 
+/// How far the axis goes on after the last point, as a share of the way there,
+/// to make room for the legend.
+const ROOM: f64 = 0.45;
+
 /// The palette's grey.
 const GREY: usize = 6;
 
@@ -82,9 +86,14 @@ pub fn chart(title: &str, curves: &[Curve], abscissa: Abscissa) -> Chart {
     if floor > 0.0 {
         series.push(level("noise of the reference".to_owned(), floor).colored(GREY));
     }
+    let mut x = Axis::log(abscissa.label());
+    if ends.0 <= ends.1 {
+        let (low, high) = (ends.0 / 1.2, ends.1 * 1.2);
+        x = x.between(low, high * (high / low).powf(ROOM));
+    }
     Chart {
         title: title.to_owned(),
-        x: Axis::log(abscissa.label()),
+        x,
         y: Axis::log("relative mean squared error"),
         series,
     }

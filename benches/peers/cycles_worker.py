@@ -1,10 +1,11 @@
 """Renders jobs with Cycles; a worker of race.py.
 
-    blender -b FILE.blend --python benches/peers/cycles.py -- JOBS.json RESULTS.json DISTRIBUTION BOUNCES
-    PYTHONPATH=<bpy> python3 benches/peers/cycles.py FILE.blend JOBS.json RESULTS.json DISTRIBUTION BOUNCES
+    blender -b FILE.blend --python benches/peers/cycles_worker.py -- JOBS.json RESULTS.json DISTRIBUTION BOUNCES
+    PYTHONPATH=<bpy> python3 benches/peers/cycles_worker.py FILE.blend JOBS.json RESULTS.json DISTRIBUTION BOUNCES
 
 Times are those of Blender's render operator, which includes the hand-over of
-the scene to Cycles and its BVH: a few hundredths of a second here.
+the scene to Cycles and its BVH: a few hundredths of a second here. (A script
+called cycles.py would hide the add-on of that name from bpy.)
 """
 
 import json
