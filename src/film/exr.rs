@@ -100,6 +100,9 @@ fn decode(bytes: &[u8], path: &Path) -> Result<Image, ExrError> {
 
     let mut image = Image::black(resolution, window);
     image.color = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+    image.half = colors
+        .iter()
+        .any(|&index| matches!(planes[index].samples, FlatSamples::F16(_)));
     for (index, plane) in planes.iter().enumerate() {
         if colors.contains(&index) || plane.window != data_window {
             continue;

@@ -13,6 +13,8 @@ pub struct Image {
     pub color: Vec<[f32; 3]>,
     /// What there is beside the colour.
     pub layers: Vec<Layer>,
+    /// Whether the colour was read from half floats, of 11 significant bits.
+    pub half: bool,
     /// Names and values of a file's attributes, those of the container format
     /// left out.
     pub attributes: Vec<(String, String)>,
@@ -37,6 +39,7 @@ impl Image {
             window,
             color: vec![[0.0; 3]; window.area()],
             layers: Vec::new(),
+            half: false,
             attributes: Vec::new(),
         }
     }
@@ -67,6 +70,7 @@ impl Image {
             window,
             color: indices().map(|i| self.color[i]).collect(),
             layers: self.layers.iter().map(crop_layer).collect(),
+            half: self.half,
             attributes: self.attributes.clone(),
         }
     }

@@ -1,6 +1,7 @@
 //! Differences as pictures.
 
 use super::REL_EPSILON;
+use super::ztest::Precision;
 
 /// Colours of a diverging scale (RdBu of ColorBrewer 2.0): too dark, equal, too
 /// bright.
@@ -59,10 +60,15 @@ pub fn relative_difference_map(a: &[[f32; 3]], b: &[[f32; 3]]) -> DifferenceMap 
 
 /// Maps z-scores, as [`super::z_test`] makes them, the most extreme of a
 /// pixel's channels; full colour at 5.
-pub fn z_map(a: &[[f32; 3]], b: &[[f32; 3]], variance: &[[f64; 3]]) -> DifferenceMap {
+pub fn z_map(
+    a: &[[f32; 3]],
+    b: &[[f32; 3]],
+    variance: &[[f64; 3]],
+    precision: Precision,
+) -> DifferenceMap {
     let pixels = a.iter().zip(b).zip(variance);
     let values = pixels.map(|((&a, &b), &variance)| {
-        let z = super::ztest::pixel_z(a, b, variance);
+        let z = super::ztest::pixel_z(a, b, variance, precision);
         let most_extreme = |x: f64, y: f64| if y.abs() > x.abs() { y } else { x };
         match z.iter().all(|z| z.is_finite()) {
             true => z.into_iter().fold(0.0, most_extreme),
@@ -112,7 +118,12 @@ mod tests {
 
     #[test]
     fn the_most_extreme_channel_counts() {
-        let map = z_map(&[[1.0, 0.5, 1.1]], &[[1.0; 3]], &[[0.01; 3]]);
+        let map = z_map(
+            &[[1.0, 0.5, 1.1]],
+            &[[1.0; 3]],
+            &[[0.01; 3]],
+            Precision::Full,
+        );
         assert_eq!(map.pixels, SCALE[0].map(|c| c as u8), "z = −5");
     }
 }

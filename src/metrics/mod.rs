@@ -13,7 +13,7 @@ mod ztest;
 pub use compare::{CompareError, Comparison, Pair};
 pub use flip::flip;
 pub use map::{DifferenceMap, relative_difference_map, z_map};
-pub use ztest::{FALSE_ALARM_RATE, ZTest, z_test};
+pub use ztest::{FALSE_ALARM_RATE, Precision, ZTest, z_test};
 
 /// The ε of relative errors, in squared radiance: errors of pixels darker than
 /// √ε = 0.1 count less than their relative size.

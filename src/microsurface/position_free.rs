@@ -8,8 +8,7 @@
 
 use smallvec::SmallVec;
 
-use super::two_walk::kept_inside;
-use super::walk::survives;
+use super::walk::Roulette;
 use super::{At, Draw, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3};
 
 /// The distribution of the depth of a facet.
@@ -149,7 +148,7 @@ impl<N, I> Microsurface<N, I> {
             } else {
                 ratio * (at.sigma / reversed)
             });
-            if !survives(&mut weight, scale, order, rng) {
+            if !Roulette::OF_CHANCE.survives(&mut weight, scale, order, rng) {
                 return;
             }
             // Move the depth to the next facet.
@@ -164,12 +163,10 @@ impl<N, I> Microsurface<N, I> {
                 if d.z < F::zero() {
                     depth.descend(rate);
                 } else {
-                    let collides = depth.climb(rate);
-                    let kept = kept_inside(collides);
-                    if rng.draw() >= kept {
-                        return;
-                    }
-                    weight = weight * (collides / kept);
+                    // No dice for the chance to stay inside, which the other
+                    // walk's weight could not know of: weighted by it, no
+                    // connection outgrows the value.
+                    weight = weight * depth.climb(rate);
                 }
             }
             order += 1;

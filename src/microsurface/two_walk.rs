@@ -8,7 +8,7 @@
 //! alone, and a path's value is c_f c_b / (c_f + c_b): no larger than the
 //! smaller connection, however sharp the other is.
 
-use super::walk::{Ray, depth_from_other_side, survives};
+use super::walk::{Ray, Roulette, depth_from_other_side};
 use super::{At, Draw, Facets, Microsurface, Ndf, Real, Rgb, Tally, Vector3};
 
 /// How many times more often than chance an upward ray is kept inside. Both
@@ -18,7 +18,7 @@ const KEEP_INSIDE: f64 = 4.0;
 /// The chance with which a ray that would collide with probability `collides`
 /// is kept inside.
 #[inline]
-pub(super) fn kept_inside<F: Real>(collides: F) -> F {
+fn kept_inside<F: Real>(collides: F) -> F {
     (F::of(KEEP_INSIDE) * collides).min(F::one())
 }
 
@@ -159,7 +159,7 @@ impl<N, I> Microsurface<N, I> {
                     return;
                 }
             }
-            if !survives(&mut weight, scale, order, rng) {
+            if !Roulette::OF_LIGHT.survives(&mut weight, scale, order, rng) {
                 return;
             }
         }

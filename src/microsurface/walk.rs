@@ -4,13 +4,29 @@ use super::{
     At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3, enters,
 };
 
-/// Weights below this are played against: continuing costs more than it can
-/// bring. From [`ROULETTE_FROM`] on, so that dark surfaces keep a clean first
-/// order.
-const ROULETTE_WEIGHT: f64 = 1.0 / 16.0;
+/// When a walk that has lost weight is played against: continuing costs more
+/// than it can bring.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Roulette {
+    /// Weights below this share of the first are.
+    weight: f64,
+    /// From this order on.
+    from: u32,
+}
 
-/// The first order after which a dark walk plays.
-const ROULETTE_FROM: u32 = 3;
+impl Roulette {
+    /// Of walks whose weight is the light that is not absorbed: late, so that
+    /// dark surfaces keep a clean first order.
+    pub const OF_LIGHT: Self = Self {
+        weight: 1.0 / 16.0,
+        from: 3,
+    };
+    /// Of walks whose weight is the chance to have come this far as well.
+    pub const OF_CHANCE: Self = Self {
+        weight: 1.0 / 2.0,
+        from: 2,
+    };
+}
 
 /// From this order on a walk plays whatever its weight, and reaches order n
 /// with probability (LONG/n)³: the expected number of steps of any walk is
@@ -101,34 +117,37 @@ pub(super) fn depth_from_other_side<F: Real>(tau: F) -> F {
     }
 }
 
-/// Russian roulette after `order` interactions of a walk that began with the
-/// weight `scale`; false ends the walk.
-#[inline]
-pub(super) fn survives<F: Real>(
-    weight: &mut Rgb<F>,
-    scale: F,
-    order: u32,
-    rng: &mut impl Draw<F>,
-) -> bool {
-    if order < ROULETTE_FROM {
-        return weight.max_channel() > F::zero();
-    }
-    let mut chance = F::one();
-    let (brightest, least) = (weight.max_channel(), F::of(ROULETTE_WEIGHT) * scale);
-    if brightest < least {
-        chance = brightest / least;
-    }
-    if order >= LONG {
-        let n = f64::from(order);
-        chance *= F::of((n / (n + 1.0)).powi(3));
-    }
-    if chance < F::one() {
-        if rng.draw() >= chance {
-            return false;
+impl Roulette {
+    /// Plays after `order` interactions of a walk that began with the weight
+    /// `scale`; false ends the walk.
+    #[inline]
+    pub fn survives<F: Real>(
+        self,
+        weight: &mut Rgb<F>,
+        scale: F,
+        order: u32,
+        rng: &mut impl Draw<F>,
+    ) -> bool {
+        if order < self.from {
+            return weight.max_channel() > F::zero();
         }
-        *weight = *weight * chance.recip();
+        let mut chance = F::one();
+        let (brightest, least) = (weight.max_channel(), F::of(self.weight) * scale);
+        if brightest < least {
+            chance = brightest / least;
+        }
+        if order >= LONG {
+            let n = f64::from(order);
+            chance *= F::of((n / (n + 1.0)).powi(3));
+        }
+        if chance < F::one() {
+            if rng.draw() >= chance {
+                return false;
+            }
+            *weight = *weight * chance.recip();
+        }
+        true
     }
-    true
 }
 
 impl<N, I> Microsurface<N, I> {
@@ -159,7 +178,7 @@ impl<N, I> Microsurface<N, I> {
             weight *= bounce.weight;
             order += 1;
             ray.follow(&bounce);
-            if !survives(&mut weight, F::one(), order, rng) {
+            if !Roulette::OF_LIGHT.survives(&mut weight, F::one(), order, rng) {
                 return None;
             }
         }
@@ -208,7 +227,7 @@ impl<N, I> Microsurface<N, I> {
             let bounce = self.facets.scatter(at.side, at.w, m, rng);
             weight *= bounce.weight;
             ray.follow(&bounce);
-            if !survives(&mut weight, F::one(), order, rng) {
+            if !Roulette::OF_LIGHT.survives(&mut weight, F::one(), order, rng) {
                 return;
             }
         }
