@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""Races smithwalk against Cycles and Mitsuba 3 on the gold sphere, in one run.
+"""Races smithwalk against Cycles and Mitsuba 3 over a few scenes, in one run.
 
-    python3 benches/peers/race.py -o DIR [--bpy DIR] [--mitsuba DIR] [--llvm LIB]
+    python3 benches/peers/race.py -o DIR [--scenes NAME,...] [--bpy DIR] [--mitsuba DIR] [--llvm LIB]
 
 Every renderer is held against its own converged images, so that differences
 between models do not count, noise alone. Two long renders A and B with seeds of
 their own are the reference: the error of an image T is the mean of relMSE(T, A)
 and relMSE(T, B) less relMSE(A, B)/2, which is what the noise of A and B adds.
-Efficiency is relMSE × CPU seconds; less is better. relMSE is that of
-`smithwalk diff`: ε = 0.01, the worst 0.1 % of the pixels left out.
+Efficiency is relMSE × CPU seconds; less is better, and its ratio between two
+renderers is that of their times at equal error. relMSE is that of `smithwalk
+diff`: ε = 0.01, the worst 0.1 % of the pixels left out.
 
-Writes race.csv, one row for each image, which `smithwalk converge --peer`
-reads, and race.md, the table. What is not installed is left out, and said so.
+Writes for each scene race-SCENE.csv, one row for each image, which `smithwalk
+converge --peer` reads, and race.md, the tables; with --docs the tables become a
+section of docs/benchmarks.md. What is not installed is left out, and said so.
 """
 
 import argparse
@@ -26,8 +28,11 @@ import sys
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 HERE = os.path.join(ROOT, "benches", "peers")
-SCENE = os.path.join(ROOT, "scenes", "gold_sphere")
-BOUNCES = 12
+BOUNCES = 12  # in all of the scenes
+SCENES = ("gold_sphere", "interior", "rough_glass", "brushed_metal")
+
+sys.path.insert(0, os.path.dirname(HERE))
+import section  # noqa: E402
 
 
 def run(command, **environment):
@@ -63,14 +68,15 @@ class Worker:
 class Smithwalk:
     """This renderer, one process for each image; the times are its own figures."""
 
-    def __init__(self, binary, estimator):
+    def __init__(self, binary, scene, estimator):
         self.name, self.binary, self.estimator = f"smithwalk {estimator}", binary, estimator
+        self.scene = os.path.join(ROOT, "scenes", scene, "scene.yaml")
 
     def render(self, jobs, _folder):
         """Render all jobs; returns version and times."""
         times = []
         for job in jobs:
-            text = run([self.binary, "render", os.path.join(SCENE, "scene.yaml"), "-o", job["out"],
+            text = run([self.binary, "render", self.scene, "-o", job["out"],
                         "--spp", str(job["spp"]), "--seed", str(job["seed"]),
                         "--estimator", self.estimator])
             found = re.search(r"spp in ([\d.]+) s \(([\d.]+) s CPU\)", text)
@@ -78,13 +84,13 @@ class Smithwalk:
         return run([self.binary, "--version"]).strip(), times
 
 
-def contenders(args):
-    """Everyone who can take part, and who can't."""
+def contenders(args, scene):
+    """Everyone who can take part in a scene, and who can't."""
     able, missing = [], []
     for estimator in ("auto", "single", "compensated"):
-        able.append(Smithwalk(args.smithwalk, estimator))
+        able.append(Smithwalk(args.smithwalk, scene, estimator))
 
-    blend = os.path.join(args.output, "gold_sphere.blend")
+    blend = os.path.join(args.output, scene + ".blend")
     cycles = os.path.join(HERE, "cycles_worker.py")
     blender = shutil.which("blender")
     if blender:
@@ -92,7 +98,7 @@ def contenders(args):
         # which may be another one that runs this script.
         system = {"PATH": os.defpath}
         run([blender, "-b", "--factory-startup", "--python",
-             os.path.join(ROOT, "blender", "scenes", "gold_sphere.py"), "--", blend], **system)
+             os.path.join(ROOT, "blender", "scenes", scene + ".py"), "--", blend], **system)
         if not os.path.exists(blend):
             sys.exit(f"blender made no {blend}")
         for label, distribution in (("GGX", "GGX"), ("Multiscatter GGX", "MULTI_GGX")):
@@ -128,8 +134,8 @@ def contenders(args):
             able.append(Worker(
                 f"Mitsuba 3 {variant} GGX",
                 lambda jobs, results, v=variant, s=sampler: [
-                    sys.executable, os.path.join(HERE, "mitsuba_worker.py"), SCENE, jobs, results,
-                    v, s, str(BOUNCES)],
+                    sys.executable, os.path.join(HERE, "mitsuba_worker.py"),
+                    os.path.join(ROOT, "scenes", scene), jobs, results, v, s],
                 **path))
     return able, missing
 
@@ -139,9 +145,9 @@ def rel_mse(args, image, reference):
     return json.loads(run([args.smithwalk, "diff", image, reference, "--json"]))["rel_mse_trimmed"]
 
 
-def race(args, contender):
+def race(args, scene, contender):
     """Reference and images of one renderer; its version and a row for each image."""
-    folder = os.path.join(args.output, re.sub(r"\W+", "-", contender.name))
+    folder = os.path.join(args.output, scene, re.sub(r"\W+", "-", contender.name))
     os.makedirs(folder, exist_ok=True)
     references = [{"spp": args.reference_spp, "seed": 101 + i,
                    "out": os.path.join(folder, f"reference-{i}.exr")} for i in range(2)]
@@ -158,23 +164,84 @@ def race(args, contender):
     return version, rows
 
 
-def table(args, versions, rows):
-    """Markdown: figures at the last number of samples, mean over the seeds."""
+def mean_of(rows, name, spp, value):
+    """The mean over the seeds of `value(row)`, and all the values."""
+    values = [value(row) for row in rows if row["name"] == name and row["spp"] == spp]
+    return statistics.fmean(values), values
+
+
+def cost(row):
+    """relMSE × CPU s: the CPU seconds to a relMSE of 1."""
+    return row["rel_mse"] * row["cpu_s"]
+
+
+def table(args, scene, versions, rows):
+    """Markdown: figures of one scene at the last number of samples, mean over the seeds."""
     spp = args.spp[-1]
-    lines = [f"| at {spp} spp | version | wall s | CPU s | relative RMSE | relMSE × CPU s | spread |",
+    lines = [f"### {scene}", "",
+             f"| at {spp} spp | version | wall s | CPU s | relative RMSE | relMSE × CPU s | spread |",
              "|---|---|---|---|---|---|---|"]
     for name, version in versions.items():
-        mine = [row for row in rows if row["name"] == name and row["spp"] == spp]
-        costs = [row["rel_mse"] * row["cpu_s"] for row in mine]
+        wall, cpu, error = (mean_of(rows, name, spp, lambda row, k=key: row[k])[0]
+                            for key in ("wall_s", "cpu_s", "rel_mse"))
+        mean, costs = mean_of(rows, name, spp, cost)
+        spread = statistics.stdev(costs) / abs(mean) if len(costs) > 1 else 0.0
+        lines.append(f"| {name} | {version} | {wall:.2f} | {cpu:.2f} | {max(error, 0.0) ** 0.5:.4f} "
+                     f"| {mean:.2e} | ± {100 * spread:.0f} % |")
+    return "\n".join(lines) + "\n\n"
 
-        def mean(key, mine=mine):
-            return statistics.fmean(row[key] for row in mine)
 
-        spread = statistics.stdev(costs) / statistics.fmean(costs) if len(costs) > 1 else 0.0
-        lines.append(f"| {name} | {version} | {mean('wall_s'):.2f} | {mean('cpu_s'):.2f} "
-                     f"| {max(mean('rel_mse'), 0.0) ** 0.5:.4f} | {statistics.fmean(costs):.2e} "
-                     f"| ± {100 * spread:.0f} % |")
-    return "\n".join(lines) + "\n"
+def alike(name):
+    """Our estimator that does what the peer does."""
+    if name.startswith("Cycles 3.4 Multi"):
+        return "smithwalk auto"
+    return "smithwalk compensated" if "Multiscatter" in name else "smithwalk single"
+
+
+def factors(args, raced):
+    """Markdown: by what factor we lead (above 1) or trail (below 1) at equal error."""
+    spp, scenes = args.spp[-1], list(raced)
+    names = list(dict.fromkeys(name for versions, _ in raced.values() for name in versions))
+
+    def factor(scene, name, ours):
+        versions, rows = raced[scene]
+        if name not in versions or ours not in versions:
+            return "–"
+        theirs, mine = (mean_of(rows, n, spp, cost)[0] for n in (name, ours))
+        return f"{theirs / mine:.2f}" if theirs > 0.0 and mine > 0.0 else "–"
+
+    text = ""
+    for title, ours in (
+        ("CPU time to equal error, over that of all orders (`auto`); above 1 we lead", None),
+        ("Over that of our estimator of the same kind", alike),
+    ):
+        lines = [title + ":", "", "| | " + ("ours | " if ours else "") + " | ".join(scenes) + " |",
+                 "|---" * (len(scenes) + 1 + bool(ours)) + "|"]
+        for name in names:
+            if name.startswith("smithwalk"):
+                continue
+            own = ours(name) if ours else "smithwalk auto"
+            cells = [factor(scene, name, own) for scene in scenes]
+            lines.append("| " + " | ".join([name] + ([own.split()[1]] if ours else []) + cells) + " |")
+        text += "\n".join(lines) + "\n\n"
+    return text
+
+
+def page(args, raced, missing):
+    """The tables and what they mean."""
+    text = ("Every renderer against its own converged images, noise alone: relMSE (ε = 0.01, the worst\n"
+            f"0.1 % of the pixels left out) × CPU seconds, {args.seeds} images each, {os.cpu_count()} threads, one run of\n"
+            "`benches/peers/race.py`. GGX is single scattering; so is all that Mitsuba does. Multiscatter GGX\n"
+            "is a random walk in Cycles 3.4 and a scaling of single scattering in 5.0. Times are of the\n"
+            "render call, with the scene's hand-over in Cycles. Mitsuba's `roughconductor` takes no rotation\n"
+            "of the tangent: its engine-turned steel (`brushed_metal`) is brushed along u, another picture;\n"
+            "and it counts a glass colour once, not at every facet.\n\n")
+    text += factors(args, raced)
+    for scene, (versions, rows) in raced.items():
+        text += table(args, scene, versions, rows)
+    for reason in missing:
+        text += f"Left out: {reason}.\n"
+    return text.rstrip() + "\n"
 
 
 def main():
@@ -183,6 +250,7 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", required=True, help="folder for images and tables")
     parser.add_argument("--smithwalk", default=os.path.join(ROOT, "target", "release", "smithwalk"))
+    parser.add_argument("--scenes", default=",".join(SCENES), help="comma-separated folders of scenes/")
     parser.add_argument("--bpy", help="PYTHONPATH of the bpy module, version 5.0, with a numpy below 2")
     parser.add_argument("--mitsuba", help="folder with the mitsuba module, if not installed")
     parser.add_argument("--llvm", help="libLLVM.so for Mitsuba's llvm variant")
@@ -190,32 +258,37 @@ def main():
     parser.add_argument("--reference-spp", type=int, default=512, help="of each of the two")
     parser.add_argument("--seeds", type=int, default=3, help="images to average over")
     parser.add_argument("--only", help="regular expression: names of those who take part")
+    parser.add_argument("--docs", action="store_true", help="write the section of docs/benchmarks.md")
     args = parser.parse_args()
     args.spp = sorted(int(n) for n in args.spp.split(","))
     args.output = os.path.abspath(args.output)
     os.makedirs(args.output, exist_ok=True)
 
-    able, missing = contenders(args)
-    versions, rows = {}, []
-    for contender in able:
-        if args.only and not re.search(args.only, contender.name):
-            continue
-        print(f"{contender.name} …", file=sys.stderr, flush=True)
-        versions[contender.name], more = race(args, contender)
-        rows += more
-        # After everyone, so that a late failure loses nothing.
-        with open(os.path.join(args.output, "race.csv"), "w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
-    if not rows:
-        sys.exit("nobody takes part")
-    text = table(args, versions, rows)
+    raced, missing = {}, []
+    for scene in args.scenes.split(","):
+        able, missing = contenders(args, scene)
+        versions, rows = {}, []
+        for contender in able:
+            if args.only and not re.search(args.only, contender.name):
+                continue
+            print(f"{scene}: {contender.name} …", file=sys.stderr, flush=True)
+            versions[contender.name], more = race(args, scene, contender)
+            rows += more
+            # After everyone, so that a late failure loses nothing.
+            path = os.path.join(args.output, f"race-{scene}.csv")
+            with open(path, "w", encoding="utf-8", newline="") as file:
+                writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+                writer.writeheader()
+                writer.writerows(rows)
+        if not rows:
+            sys.exit(f"{scene}: nobody takes part")
+        raced[scene] = versions, rows
+    text = page(args, raced, missing)
     with open(os.path.join(args.output, "race.md"), "w", encoding="utf-8") as file:
         file.write(text)
+    if args.docs:
+        section.replace("Beside other renderers", text)
     print(text, end="")
-    for reason in missing:
-        print(f"left out: {reason}")
 
 
 if __name__ == "__main__":
