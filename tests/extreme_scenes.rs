@@ -216,14 +216,15 @@ impl Comparison {
                 (sum(a), sum(b) / factor)
             })
             .collect();
-        let differ = pairs
+        let same = pairs
             .iter()
-            .filter(|(a, b)| !((a - b).abs() <= 0.01 * a.max(*b)));
+            .filter(|(a, b)| (a - b).abs() <= 0.01 * a.max(*b))
+            .count();
         let (sum, difference, squares) = pairs.iter().fold((0.0, 0.0, 0.0), |(s, d, q), (a, b)| {
             (s + a, d + (b - a), q + (b - a).powi(2))
         });
         Self {
-            differ: differ.count() as f64 / pairs.len() as f64,
+            differ: 1.0 - same as f64 / pairs.len() as f64,
             bias: difference / sum,
             score: difference / f64::sqrt(squares).max(f64::MIN_POSITIVE),
         }
