@@ -12,7 +12,7 @@ use super::{Features, Leaf, Material, Number, Object, Roughness, Scene, SceneMes
 use crate::bsdf::Method;
 use crate::camera::Camera;
 use crate::color::Rgb;
-use crate::description::{Assignment, Description};
+use crate::description::{Assignment, Description, Transform};
 use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::mesh::Mesh;
@@ -67,6 +67,12 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
     let texture_index: BTreeMap<String, usize> = textures.keys().cloned().zip(0..).collect();
     let textures: Vec<Texture> = textures.into_values().collect();
     let mut materials = MaterialTable::new(description, &texture_index);
+    let origin = origin(description);
+    let at = |transform: &Transform| {
+        let mut to_world = to_affine(transform);
+        to_world.translation -= origin;
+        to_world
+    };
     let mut placing = Placing::new(description, meshes);
     let mut objects = Vec::new();
     let mut geometries = Vec::new();
@@ -75,7 +81,7 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
             .name
             .clone()
             .unwrap_or_else(|| format!("objects.{index}"));
-        let result = placing.place(object, &name, &mut materials);
+        let result = placing.place(object, &name, at(&object.transform), &mut materials);
         match result {
             Ok((object, geometry)) => {
                 objects.push(object);
@@ -104,7 +110,7 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
 
     let mut lamps: Vec<Light> = Vec::new();
     for (index, light) in description.lights.iter().enumerate() {
-        match resolve_light(light, to_affine(&light.transform), description.light_units) {
+        match resolve_light(light, at(&light.transform), description.light_units) {
             Ok(light) => lamps.push(light),
             Err(error) => problems.push(format!("lights.{index}: {error}")),
         }
@@ -121,7 +127,7 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
     let triangles = emissive_triangles(&mut objects, &scene_meshes, &materials, &textures);
     let camera = description.camera.as_ref().map(|camera| {
         let resolution = [description.film.width, description.film.height];
-        Camera::from_description(camera, to_affine(&camera.transform), resolution)
+        Camera::from_description(camera, at(&camera.transform), resolution)
     });
     let camera = match camera.transpose() {
         Ok(camera) => camera,
@@ -228,9 +234,9 @@ impl Placing {
         &mut self,
         object: &crate::description::Object,
         name: &str,
+        to_world: Affine3A,
         materials: &mut MaterialTable<'_>,
     ) -> Result<(Object, Geometry), String> {
-        let to_world = to_affine(&object.transform);
         let linear = Mat3::from(to_world.matrix3);
         let determinant = linear.as_dmat3().determinant();
         if !to_world.is_finite() || determinant == 0.0 {
@@ -330,6 +336,23 @@ fn assign(
             .iter()
             .map(|slot| find(slot, ", which the mesh's usemtl line asks for"))
             .collect(),
+    }
+}
+
+/// The largest coordinate of a camera, in metres, up to which the scene keeps
+/// the file's origin: there `f32` still resolves a tenth of a millimetre.
+const NEAR_ORIGIN: f32 = 1024.0;
+
+/// What the file's coordinates are counted from. Positions in `f32` are as
+/// coarse as they are far from the origin, and rays start off surfaces by a
+/// multiple of that; so a scene that is far away is moved to its camera.
+fn origin(description: &Description) -> Vec3A {
+    let camera = description.camera.as_ref();
+    let position = camera.map_or(Vec3A::ZERO, |c| to_affine(&c.transform).translation);
+    if position.is_finite() && position.abs().max_element() > NEAR_ORIGIN {
+        position
+    } else {
+        Vec3A::ZERO
     }
 }
 
