@@ -1,6 +1,6 @@
 //! What single precision costs against double.
 
-use super::domain::{ALPHAS, direction};
+use super::domain::{ALPHAS, direction, stream};
 use smithwalk::microsurface::*;
 
 /// Largest relative difference of single from double precision over a grid,
@@ -144,4 +144,31 @@ fn single_precision_follows_double() {
         }
     }
     beta.below("x B(x, y)", 5e-5);
+}
+
+/// Level directions cancel in scalar products: what rough glass reflects at
+/// grazing angles must not round to a density of 0 where it was sampled.
+#[test]
+fn grazing_glass_has_a_density_where_it_reflects() {
+    for eta in [1e-3, 1.0 / 1.5, 1.5f32] {
+        let surface = Microsurface {
+            ndf: Beckmann::isotropic(1e-3f32),
+            facets: Dielectric {
+                eta,
+                tint: Rgb::white(),
+            },
+        };
+        let mut rng = stream(1);
+        for cos in [1e-4, 1e-5, 1e-6] {
+            let wi = direction(cos, 0.7);
+            let exits = (0..2000).filter_map(|_| surface.sample_single(wi, &mut rng));
+            let reflected = exits.filter(|exit| exit.direction.z > 0.0);
+            let densities: Vec<f32> = reflected
+                .map(|exit| surface.pdf_single(wi, exit.direction))
+                .collect();
+            assert!(densities.len() > 200, "{}", densities.len());
+            let missing = densities.iter().filter(|&&pdf| pdf <= 0.0).count();
+            assert_eq!(missing, 0, "η {eta}, cosθ {cos}: of {}", densities.len());
+        }
+    }
 }
