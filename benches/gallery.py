@@ -40,6 +40,8 @@ PICTURES = (
     ("glass-1", "glass, α = 1", "dielectric: {alpha: 1, ior: 1.5}", None),
 )
 ESTIMATORS = ("single", "auto")
+# What is timed: with branches, noisier pixels would get more paths.
+PLAIN_PATHS = ("-D", "sampling.branches=1")
 
 
 def run(command):
@@ -50,10 +52,10 @@ def run(command):
     return done.stdout
 
 
-def render(args, material, estimator, spp, seed, *outputs):
+def render(args, material, estimator, spp, seed, *outputs, options=()):
     """One image; CPU seconds."""
     command = [args.smithwalk, "render", SCENE, "-D", f"materials.figure={{{material}}}",
-               "--estimator", estimator, "--spp", str(spp), "--seed", str(seed)]
+               "--estimator", estimator, "--spp", str(spp), "--seed", str(seed), *options]
     for output in outputs:
         command += ["-o", output]
     return float(re.search(r"\(([\d.]+) s CPU\)", run(command))[1])
@@ -78,7 +80,7 @@ def cost(args, material, folder):
     for repeat in range(args.repeats):
         for estimator in ESTIMATORS if repeat % 2 == 0 else ESTIMATORS[::-1]:
             times[estimator].append(render(args, material, estimator, args.timing_spp, 2 + repeat,
-                                           os.path.join(folder, "timing.exr")))
+                                           os.path.join(folder, "timing.exr"), options=PLAIN_PATHS))
     ratios = sorted(m / s for s, m in zip(times["single"], times["auto"]))
     per_sample = [1e9 * statistics.median(times[e]) / (PIXELS * args.timing_spp) for e in ESTIMATORS]
     return per_sample, ratios

@@ -63,7 +63,8 @@ def turns(args, scene, variants, folder):
         order = list(range(len(variants)))
         for index in order if repeat % 2 == 0 else order[::-1]:
             text = run([args.smithwalk, "render", scene_file(scene), "-o", os.path.join(folder, "out.exr"),
-                        "--spp", str(args.spp), "--seed", str(repeat), *variants[index]])
+                        "--spp", str(args.spp), "--seed", str(repeat),
+                        "-D", "sampling.branches=1", *variants[index]])
             found = re.search(r"spp in ([\d.]+) s \(([\d.]+) s CPU\)", text)
             times[index].append((float(found[1]), float(found[2])))
     return times
