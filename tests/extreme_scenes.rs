@@ -135,10 +135,12 @@ impl Draft {
         self.image_in(&folder, spp)
     }
 
+    /// Of plain paths: with branches, a path that rounding has changed would
+    /// change its neighbours as well, by what is decided from its noise.
     fn image_in(&self, folder: &std::path::Path, spp: u32) -> Image {
         let list = |p: [f64; 3]| format!("{:?}", self.place.point(p));
         let mut text = format!(
-            "smithwalk: 1\ncamera:\n  transform: {{look_at: {{from: {}, to: {}}}}}\n  projection: {{perspective: {{fov: 50}}}}\nfilm: {{width: 32, height: 32}}\nsampling: {{max_bounces: {}}}\n{}\nmeshes:\n",
+            "smithwalk: 1\ncamera:\n  transform: {{look_at: {{from: {}, to: {}}}}}\n  projection: {{perspective: {{fov: 50}}}}\nfilm: {{width: 32, height: 32}}\nsampling: {{max_bounces: {}, branches: 1}}\n{}\nmeshes:\n",
             list(self.eye),
             list(self.target),
             self.max_bounces,
