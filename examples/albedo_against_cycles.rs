@@ -9,14 +9,15 @@
 //! Cycles' values come from `tests/data`, measured by
 //! `blender/measure_albedo.py`; the model's are computed here, in f64.
 
-#[path = "../tests/cycles/mod.rs"]
-mod cycles;
+#[path = "../tests/cycles/measured.rs"]
+mod measured;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use cycles::{GOLD, Glass, Mean, Metal, means, rows};
+use measured::{GOLD, Glass, Mean, Metal, means, rows};
 use rayon::prelude::*;
+use serde::de::DeserializeOwned;
 use smithwalk::microsurface::*;
 use smithwalk::report::plot::{Axis, Chart, Mark, Series};
 
@@ -35,18 +36,26 @@ struct Row {
     cycles_4_5: Mean,
 }
 
+/// The rows of both versions' files of a `kind` that `keep` wants, in pairs.
+fn pairs<R: DeserializeOwned>(kind: &str, keep: impl Fn(&R) -> bool) -> Vec<[R; 2]> {
+    let [old, new] = ["3.4", "4.5"].map(|version| {
+        let mut rows: Vec<R> = rows(&format!("cycles_{version}_albedo_{kind}.csv"));
+        rows.retain(&keep);
+        rows
+    });
+    assert_eq!(old.len(), new.len());
+    old.into_iter().zip(new).map(|(o, n)| [o, n]).collect()
+}
+
 /// Gold's green channel.
 fn metal() -> Vec<Row> {
-    let read = |version: &str| -> Vec<Metal> {
-        let mut rows: Vec<Metal> = rows(&format!("cycles_{version}_albedo_conductor.csv"));
-        rows.retain(|r| r.distribution == "MULTI_GGX" && r.anisotropy == 0.0);
-        rows
-    };
-    let (old, new) = (read("3.4"), read("4.5"));
-    let pairs = old.par_iter().zip(&new).map(|(old, new)| {
+    let isotropic = |r: &Metal| r.distribution == "MULTI_GGX" && r.anisotropy == 0.0;
+    let rows = pairs("conductor", isotropic).into_par_iter();
+    let rows = rows.map(|[old, new]| {
         assert_eq!((old.roughness, old.cos), (new.roughness, new.cos));
+        let (alpha_x, alpha_y) = old.alpha();
         let surface = Microsurface {
-            ndf: Ggx::isotropic(old.roughness * old.roughness),
+            ndf: Ggx { alpha_x, alpha_y },
             facets: Conductor {
                 fresnel: ConductorFresnel::Constant(Rgb(GOLD)),
             },
@@ -59,22 +68,18 @@ fn metal() -> Vec<Row> {
             roughness: old.roughness,
             cos: old.cos,
             exact,
-            cycles_3_4: Mean::measured(old.green, old.green_se),
-            cycles_4_5: Mean::measured(new.green, new.green_se),
+            cycles_3_4: old.measured()[1],
+            cycles_4_5: new.measured()[1],
         }
     });
-    pairs.collect()
+    rows.collect()
 }
 
 /// Reflectance of glass from one side.
 fn glass(side: &str) -> Vec<Row> {
-    let read = |version: &str| -> Vec<Glass> {
-        let mut rows: Vec<Glass> = rows(&format!("cycles_{version}_albedo_dielectric.csv"));
-        rows.retain(|r| r.distribution == "MULTI_GGX" && r.side == side);
-        rows
-    };
-    let (old, new) = (read("3.4"), read("4.5"));
-    let pairs = old.par_iter().zip(&new).map(|(old, new)| {
+    let on_side = |r: &Glass| r.distribution == "MULTI_GGX" && r.side == side;
+    let rows = pairs("dielectric", on_side).into_par_iter();
+    let rows = rows.map(|[old, new]| {
         assert_eq!((old.roughness, old.cos), (new.roughness, new.cos));
         let surface = Microsurface {
             ndf: Ggx::isotropic(old.roughness * old.roughness),
@@ -92,11 +97,11 @@ fn glass(side: &str) -> Vec<Row> {
             roughness: old.roughness,
             cos: old.cos,
             exact,
-            cycles_3_4: Mean::measured(old.r, old.r_se),
-            cycles_4_5: Mean::measured(new.r, new.r_se),
+            cycles_3_4: old.measured()[0],
+            cycles_4_5: new.measured()[0],
         }
     });
-    pairs.collect()
+    rows.collect()
 }
 
 fn table(title: &str, rows: &[Row]) {
@@ -139,10 +144,13 @@ fn white() {
     );
     for roughness in PRINTED {
         let of_roughness = rows.iter().filter(|r| r.roughness == roughness);
-        let cells = of_roughness.map(|r| format!(" {:.5} ± {:.5} |", r.red, r.red_se));
+        let cells = of_roughness.map(|r| {
+            let [red, _] = r.measured();
+            format!(" {:.5} ± {:.5} |", red.value, red.error)
+        });
         println!("| {roughness} |{}", cells.collect::<String>());
     }
-    let errors = rows.iter().map(|r| r.red - 1.0);
+    let errors = rows.iter().map(|r| r.measured()[0].value - 1.0);
     let (least, most) = errors.fold((0.0_f64, 0.0_f64), |(a, b), e| (a.min(e), b.max(e)));
     println!("\nfrom {least:+.4} to {most:+.4} over all roughnesses");
 }

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Settings, film, load};
+use common::{Settings, image};
 use exr::prelude::write_rgb_file;
 use smithwalk::film::Image;
 use std::fmt::Write as _;
@@ -156,8 +156,7 @@ impl Draft {
         }
         let path = folder.join("scene.yaml");
         std::fs::write(&path, text).unwrap();
-        let (description, scene) = load(&path, &[]);
-        film(&description, &scene, Settings::spp(spp), &[]).develop()
+        image(&path, &[], Settings::spp(spp), &[])
     }
 }
 

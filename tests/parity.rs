@@ -6,7 +6,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{Settings, image, repository};
+use common::{Settings, image};
 use smithwalk::film::{Image, read_exr};
 
 /// Pixels on a side of the blocks that are compared: enough to average noise
@@ -16,8 +16,8 @@ const BLOCK: usize = 4;
 /// Folders with a scene and its reference.
 fn cases() -> Vec<PathBuf> {
     let mut found = Vec::new();
-    let root = repository("tests/data/parity");
-    for case in std::fs::read_dir(&root).expect("the cases are there") {
+    let root = Path::new("tests/data/parity");
+    for case in std::fs::read_dir(root).expect("the cases are there") {
         for version in std::fs::read_dir(case.expect("readable").path()).expect("a folder") {
             let folder = version.expect("readable").path();
             if folder.join("scene.yaml").exists() {

@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{Settings, film, image, load, repository};
+use std::path::Path;
+
+use common::{Settings, film, image, load};
 use smithwalk::film::{Aov, Window, read_exr};
 use smithwalk::metrics::{mean, rel_bias, rel_bias_trimmed};
 
@@ -11,7 +13,7 @@ const GOLD: &str = "scenes/gold_sphere/scene.yaml";
 
 /// The scene files of the repository.
 fn scenes() -> Vec<std::path::PathBuf> {
-    let mut files: Vec<_> = std::fs::read_dir(repository("scenes"))
+    let mut files: Vec<_> = std::fs::read_dir("scenes")
         .expect("scenes are there")
         .map(|entry| entry.expect("readable").path().join("scene.yaml"))
         .filter(|path| path.exists())
@@ -49,7 +51,7 @@ fn the_number_of_threads_changes_no_bit() {
             }),
             ..Settings::spp(8)
         };
-        pool.install(|| image(&repository(GOLD), &[], settings, &[]))
+        pool.install(|| image(Path::new(GOLD), &[], settings, &[]))
     };
     assert_eq!(render(1).color, render(3).color);
 }
@@ -64,7 +66,7 @@ fn a_seed_is_an_image() {
             height: 32,
         });
         image(
-            &repository(GOLD),
+            Path::new(GOLD),
             &[],
             Settings {
                 seed,
@@ -120,7 +122,7 @@ fn single_and_multiple_scattering_add_up_to_the_image() {
         ..Settings::spp(8)
     };
     let image = image(
-        &repository(GOLD),
+        Path::new(GOLD),
         &[],
         settings,
         &[Aov::Single, Aov::Multiple],
@@ -151,12 +153,12 @@ fn single_and_multiple_scattering_add_up_to_the_image() {
 #[test]
 fn the_gold_sphere_agrees_with_the_random_walk_of_cycles() {
     let ours = image(
-        &repository(GOLD),
+        Path::new(GOLD),
         &[("materials.gold.conductor.roughness", "0.5")],
         Settings::spp(48),
         &[],
     );
-    let theirs = read_exr(&repository(
+    let theirs = read_exr(Path::new(
         "scenes/gold_sphere/cycles_3.4_multi_ggx_r0.5.exr",
     ))
     .expect("reads");
@@ -171,7 +173,7 @@ fn the_gold_sphere_agrees_with_the_random_walk_of_cycles() {
 fn single_scattering_agrees_with_cycles() {
     for roughness in ["0.5", "0.8"] {
         let ours = image(
-            &repository(GOLD),
+            Path::new(GOLD),
             &[
                 ("materials.gold.conductor.roughness", roughness),
                 ("sampling.estimator", "single"),
@@ -180,7 +182,7 @@ fn single_scattering_agrees_with_cycles() {
             &[],
         );
         let file = format!("scenes/gold_sphere/cycles_4.5_ggx_r{roughness}.exr");
-        let theirs = read_exr(&repository(&file)).expect("reads");
+        let theirs = read_exr(Path::new(&file)).expect("reads");
         for (bias, name) in [
             (rel_bias(&ours.color, &theirs.color), "plain"),
             (rel_bias_trimmed(&ours.color, &theirs.color), "robust"),

@@ -53,7 +53,7 @@ class ImageWriter:
                         f.write(image.packed_file.data)
                     return stem + extension
             else:
-                path = bpy.path.abspath(image.filepath, library=image.library)
+                path = image.filepath_from_user()
                 if not os.path.isfile(path):
                     self.log.warn(where, f'image "{image.name}": no such file: {path}')
                     return None

@@ -1,18 +1,12 @@
 //! What several test files share: rendering scene files without the command.
-#![allow(dead_code)] // each test file uses its own part
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use smithwalk::description::{Description, Filter};
 use smithwalk::film::{Aov, Film, Image, PixelFilter, Window};
 use smithwalk::integrator::{Limits, RenderRequest, render};
 use smithwalk::scene::{Scene, resolve};
-
-/// A file of the repository.
-pub fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
 
 /// A scene file with changes, read and built.
 pub fn load(path: &Path, overrides: &[(&str, &str)]) -> (Description, Scene) {

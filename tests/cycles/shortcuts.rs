@@ -1,6 +1,5 @@
 //! Walks and single scattering with the shortcuts that Cycles takes, to see
 //! that they account for its difference from the model.
-#![allow(dead_code)] // each user takes its part
 
 use smithwalk::microsurface::*;
 

@@ -6,13 +6,12 @@
 //! pixels of 8192 samples: at most 3.7e-4, in the median below 1e-4. Ours come
 //! from that of 16 scrambled Sobol sets.
 
-mod cycles;
-#[path = "cycles/shortcuts.rs"]
-mod shortcuts;
-
-use cycles::{GOLD, Mean, Metal, Summary, means, rows, worst_score};
 use rayon::prelude::*;
 use smithwalk::microsurface::*;
+
+use crate::judged::{Summary, worst_score};
+use crate::measured::{GOLD, Mean, Metal, means, rows};
+use crate::shortcuts;
 
 /// Cycles and its counterpart here may differ by this, noise included.
 const BAR: f64 = 0.002;
@@ -83,14 +82,16 @@ fn walked() -> Vec<Walked> {
 fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
     let walked = walked();
     let difference = |of: fn(&Walked) -> Mean| -> Summary {
-        let green = |w: &Walked| Mean::measured(w.row.green, w.row.green_se);
-        let rows = walked.iter().map(|w| (w.row.name(), of(w).above(green(w))));
+        let rows = walked.iter().map(|w| {
+            let [_, green] = w.row.measured();
+            (w.row.name(), of(w).above(green))
+        });
         Summary::of(&rows.collect::<Vec<_>>())
     };
 
     // With its shortcuts the walk is Cycles', in every row.
     let shortcut = difference(|w| w.shortcut[1]);
-    println!("with the shortcuts: {shortcut:#?}");
+    println!("with the shortcuts: {shortcut}");
     assert_eq!(shortcut.count, 330);
     assert!(shortcut.worst <= BAR);
     assert!(shortcut.score <= worst_score(shortcut.count));
@@ -98,7 +99,7 @@ fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
 
     // Without them it is not, and the comparison sees that.
     let exact = difference(|w| w.exact[1]);
-    println!("the exact walk: {exact:#?}");
+    println!("the exact walk: {exact}");
     assert!(exact.worst > 8.0 * BAR && exact.chi_square > 20.0);
 
     // White metal loses nothing, here or there.
@@ -110,7 +111,8 @@ fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
     {
         let name = row.name();
         assert!((exact[0].value - 1.0).abs() < 1e-12, "{name}: {exact:?}");
-        assert!((row.red - 1.0).abs() < 2e-5, "{name}: {}", row.red);
+        let [red, _] = row.measured();
+        assert!((red.value - 1.0).abs() < 2e-5, "{name}: {red:?}");
         assert!((shortcut[0].value - 1.0).abs() < 2e-5, "{name}");
     }
 
@@ -128,8 +130,9 @@ fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
             (ours.value - exact).abs() < allowed,
             "{ours:?}, not {exact}"
         );
-        let excess = w.row.green - ours.value;
-        let allowed = TABLE_ERROR + 5.0 * ours.error.hypot(w.row.green_se);
+        let [_, green] = w.row.measured();
+        let excess = green.value - ours.value;
+        let allowed = TABLE_ERROR + 5.0 * ours.error.hypot(green.error);
         assert!(
             (excess - (cycles - exact)).abs() < allowed,
             "r {roughness} cosθ {cos}: Cycles 3.4 is too bright by {excess}"
@@ -146,13 +149,11 @@ fn single<N: Ndf<f64>>(distribution: &str, ndf: fn(f64, f64) -> N) -> Summary {
         let (alpha_x, alpha_y) = row.alpha();
         let (surface, wi) = (gold(ndf(alpha_x, alpha_y)), row.view());
         let ours = means(POINTS, |rng| seen(surface.sample_single(wi, rng)));
-        let red = Mean::measured(row.red, row.red_se);
-        let green = Mean::measured(row.green, row.green_se);
-        let channels = ours.into_iter().zip([red, green]);
+        let channels = ours.into_iter().zip(row.measured());
         channels.map(|(ours, cycles)| (row.name(), ours.above(cycles)))
     });
     let summary = Summary::of(&differences.collect::<Vec<_>>());
-    println!("{distribution}: {summary:#?}");
+    println!("{distribution}: {summary}");
     assert_eq!(summary.count, 660);
     assert!(summary.worst <= BAR);
     summary

@@ -1,6 +1,5 @@
 //! Albedos that Blender's Cycles measured (`tests/data`, written by
 //! `blender/measure_albedo.py`), and the means to measure the model's as well.
-#![allow(dead_code)] // each user takes its part
 
 use std::path::Path;
 
@@ -9,13 +8,12 @@ use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use smithwalk::microsurface::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Reflectance of gold facets: red is a white furnace.
 pub const GOLD: [f64; 3] = [1.0, 0.71, 0.29];
 
 /// A row of `cycles_*_albedo_conductor.csv`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Metal {
     pub distribution: String,
     /// √α.
@@ -24,31 +22,34 @@ pub struct Metal {
     /// Of the tangent, in turns.
     pub rotation: f64,
     pub cos: f64,
-    pub red: f64,
-    pub green: f64,
-    pub blue: f64,
-    pub red_se: f64,
-    pub green_se: f64,
-    pub blue_se: f64,
+    red: f64,
+    green: f64,
+    red_se: f64,
+    green_se: f64,
 }
 
 /// A row of `cycles_*_albedo_dielectric.csv`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Glass {
     pub distribution: String,
     /// √α.
     pub roughness: f64,
-    pub ior: f64,
+    ior: f64,
     /// `outside` or `inside`.
     pub side: String,
     pub cos: f64,
-    pub r: f64,
-    pub t: f64,
-    pub r_se: f64,
-    pub t_se: f64,
+    r: f64,
+    t: f64,
+    r_se: f64,
+    t_se: f64,
 }
 
 impl Metal {
+    /// The albedo in the red channel and in the green one.
+    pub fn measured(&self) -> [Mean; 2] {
+        [(self.red, self.red_se), (self.green, self.green_se)].map(Mean::rounded)
+    }
+
     /// α along x and y, as the Anisotropic node takes them.
     pub fn alpha(&self) -> (f64, f64) {
         let (alpha, a) = (self.roughness * self.roughness, self.anisotropy);
@@ -65,22 +66,14 @@ impl Metal {
     pub fn view(&self) -> Vector3<f64> {
         Vector3::spherical(self.cos, -std::f64::consts::TAU * (0.25 + self.rotation))
     }
-
-    /// What the row is, for messages.
-    pub fn name(&self) -> String {
-        let Self {
-            distribution,
-            roughness,
-            anisotropy,
-            rotation,
-            cos,
-            ..
-        } = self;
-        format!("{distribution} r {roughness} a {anisotropy} turned {rotation} cosθ {cos}")
-    }
 }
 
 impl Glass {
+    /// Reflectance and transmittance.
+    pub fn measured(&self) -> [Mean; 2] {
+        [(self.r, self.r_se), (self.t, self.t_se)].map(Mean::rounded)
+    }
+
     /// n(far side) / n(near side).
     pub fn eta(&self) -> f64 {
         match self.side.as_str() {
@@ -88,18 +81,6 @@ impl Glass {
             "inside" => self.ior.recip(),
             side => panic!("no side: {side}"),
         }
-    }
-
-    /// What the row is, for messages.
-    pub fn name(&self) -> String {
-        let Self {
-            distribution,
-            roughness,
-            side,
-            cos,
-            ..
-        } = self;
-        format!("{distribution} r {roughness} {side} cosθ {cos}")
     }
 }
 
@@ -128,8 +109,8 @@ pub struct Mean {
 const ROUNDING: f64 = 2.9e-7;
 
 impl Mean {
-    /// Of Cycles.
-    pub fn measured(value: f64, error: f64) -> Self {
+    /// A value of Cycles with its standard error, as the file has them.
+    fn rounded((value, error): (f64, f64)) -> Self {
         let error = error.hypot(ROUNDING);
         Self { value, error }
     }
@@ -139,60 +120,6 @@ impl Mean {
         Self {
             value: self.value - other.value,
             error: self.error.hypot(other.error),
-        }
-    }
-
-    /// Standard scores from 0.
-    pub fn score(self) -> f64 {
-        self.value.abs() / self.error
-    }
-}
-
-/// The chance that one test's comparisons pass their bound though nothing is
-/// wrong.
-const FALSE_ALARM: f64 = 1e-4;
-
-/// The score that `count` comparisons may reach (Šidák). Errors come from the
-/// scatter of 16 values on either side, so scores have Student's distribution
-/// of 15 to 30 degrees; the bound is that of 15, and nowhere too tight.
-pub fn worst_score(count: usize) -> f64 {
-    let each = -((-FALSE_ALARM).ln_1p() / count as f64).exp_m1();
-    let student = StudentsT::new(0.0, 1.0, f64::from(SETS - 1)).expect("degrees of freedom");
-    -student.inverse_cdf(0.5 * each)
-}
-
-/// The comparison of many differences with 0.
-#[derive(Debug)]
-pub struct Summary {
-    pub count: usize,
-    /// The largest difference.
-    pub worst: f64,
-    /// The row it is in.
-    pub worst_row: String,
-    /// The largest score.
-    pub score: f64,
-    /// The mean of the squared scores: where nothing but noise is between the
-    /// two 1.07 to 1.15 (Student), with a standard deviation of at most
-    /// 1.84/√count. Tests ask for less than 1.5 of 330 and 660 rows, and 1.8
-    /// of 60: 3.4 and 2.7 deviations, for fixed seeds and fixed tables.
-    pub chi_square: f64,
-    /// The largest standard error.
-    pub error: f64,
-}
-
-impl Summary {
-    pub fn of(differences: &[(String, Mean)]) -> Self {
-        let most = |f: fn(&Mean) -> f64| differences.iter().map(|(_, d)| f(d)).fold(0.0, f64::max);
-        let worst = most(|d| d.value.abs());
-        let row = differences.iter().find(|(_, d)| d.value.abs() == worst);
-        let squares: f64 = differences.iter().map(|(_, d)| d.score().powi(2)).sum();
-        Self {
-            count: differences.len(),
-            worst,
-            worst_row: row.map(|(name, _)| name.clone()).unwrap_or_default(),
-            score: most(|d| d.score()),
-            chi_square: squares / differences.len() as f64,
-            error: most(|d| d.error),
         }
     }
 }

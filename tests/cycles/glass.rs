@@ -7,13 +7,12 @@
 //! Cycles (up to 0.001 for the walk from inside) and of 16 scrambled Sobol
 //! sets here.
 
-mod cycles;
-#[path = "cycles/shortcuts.rs"]
-mod shortcuts;
-
-use cycles::{Glass, Mean, Summary, means, rows, worst_score};
 use rayon::prelude::*;
 use smithwalk::microsurface::*;
+
+use crate::judged::{Summary, worst_score};
+use crate::measured::{Glass, Mean, Points, means, rows};
+use crate::shortcuts;
 
 /// Cycles and its counterpart here may differ by this, noise included, where
 /// the noise lets them: in rows whose error is a quarter of it at most.
@@ -52,7 +51,7 @@ fn compare(
     file: &str,
     distribution: &str,
     points: u32,
-    sample: impl Fn(&Glass, Vector3<f64>, &mut cycles::Points) -> [[f64; 2]; 2] + Sync,
+    sample: impl Fn(&Glass, Vector3<f64>, &mut Points) -> [[f64; 2]; 2] + Sync,
 ) -> Vec<Compared> {
     let mut rows: Vec<Glass> = rows(file);
     rows.retain(|row| row.distribution == distribution);
@@ -84,9 +83,7 @@ fn differences(
     let rows = compared.iter().filter(|c| c.row.side == side);
     rows.map(|c| {
         let row = &c.row;
-        let cycles = [(row.r, row.r_se), (row.t, row.t_se)][part];
-        let cycles = Mean::measured(cycles.0, cycles.1);
-        (row.name(), of(c)[part].above(cycles))
+        (row.name(), of(c)[part].above(row.measured()[part]))
     })
     .collect()
 }
@@ -100,7 +97,7 @@ fn agrees(compared: &[Compared]) -> usize {
         for part in [0, 1] {
             let all = differences(compared, side, part, |c| c.variant);
             let summary = Summary::of(&all);
-            println!("{side}, {}: {summary:#?}", ["r", "t"][part]);
+            println!("{side}, {}: {summary}", ["r", "t"][part]);
             assert!(summary.score <= worst_score(4 * all.len()));
             assert!(summary.chi_square < 1.8);
             for (name, d) in all.iter().filter(|(_, d)| d.error <= BAR / 4.0) {
@@ -132,7 +129,7 @@ fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
     }
     let outside = Summary::of(&differences(&compared, "outside", 0, |c| c.exact));
     let inside = Summary::of(&differences(&compared, "inside", 0, |c| c.exact));
-    println!("the exact walk: {outside:#?} {inside:#?}");
+    println!("the exact walk: {outside} {inside}");
     assert!((0.005..0.012).contains(&outside.worst));
     assert!((0.13..0.15).contains(&inside.worst));
     // An independent implementation of the model in numpy, three digits.
@@ -165,7 +162,7 @@ fn single_scattering_is_that_of_cycles_4_5_but_for_the_masking_of_refraction() {
     for side in ["outside", "inside"] {
         for part in [0, 1] {
             let all = Summary::of(&differences(&beckmann, side, part, |c| c.variant));
-            println!("Beckmann {side}, {}: {all:#?}", ["r", "t"][part]);
+            println!("Beckmann {side}, {}: {all}", ["r", "t"][part]);
             assert!(all.worst <= BAR);
         }
     }
@@ -175,13 +172,13 @@ fn single_scattering_is_that_of_cycles_4_5_but_for_the_masking_of_refraction() {
     for (compared, most) in [(&ggx, 0.6), (&beckmann, 0.4)] {
         for side in ["outside", "inside"] {
             let r = Summary::of(&differences(compared, side, 0, |c| c.exact));
-            assert!(r.worst <= BAR, "{r:?}");
+            assert!(r.worst <= BAR, "{r}");
             let t = differences(compared, side, 1, |c| c.exact);
             for (name, t) in &t {
                 assert!(t.value <= BAR, "{name}: {t:?}");
             }
             let t = Summary::of(&t);
-            println!("the model's refraction, {side}: {t:#?}");
+            println!("the model's refraction, {side}: {t}");
             assert!(side == "inside" || t.worst > most);
         }
     }
