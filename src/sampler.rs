@@ -13,7 +13,7 @@
 
 use rand::Rng;
 use rand_pcg::Pcg32;
-use sobol_burley::parts::{owen_scramble_rev, u32_to_f32_norm};
+use sobol_burley::parts::{owen_scramble_int4_rev, owen_scramble_rev};
 
 /// Length of the Sobol sequence as a power of two; later samples start another
 /// one, scrambled afresh.
@@ -279,9 +279,10 @@ fn sobol_4d(index: u32, key: u64) -> [f32; 4] {
             *point ^= term;
         }
     }
-    let scrambles = scrambles.as_flattened();
-    [0, 1, 2, 3]
-        .map(|lane| u32_to_f32_norm(owen_scramble_rev(point[lane], scrambles[lane]).reverse_bits()))
+    let [[a, b], [c, d]] = scrambles;
+    owen_scramble_int4_rev(point.into(), [a, b, c, d].into())
+        .reverse_bits()
+        .to_f32_norm()
 }
 
 /// The sums (XOR) of direction vectors that belong to each value of each four

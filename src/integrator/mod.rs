@@ -5,5 +5,5 @@ mod path;
 mod render;
 
 pub use kernel::{KERNELS, kernel_for};
-pub use path::{FirstHit, PathResult, PathTracer};
+pub use path::{FirstHit, PathResult, PathTracer, Split};
 pub use render::{Limits, Progress, RenderReport, RenderRequest, Stop, render};

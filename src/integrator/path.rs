@@ -1,5 +1,5 @@
-//! One camera path: unidirectional path tracing with a light sample at every
-//! vertex, combined with BSDF sampling by the balance heuristic.
+//! One camera path: unidirectional path tracing with light samples at every
+//! vertex, combined with BSDF sampling by the power heuristic.
 
 use std::ops::Range;
 
@@ -61,6 +61,16 @@ impl PathResult {
             multiple: self.radiance.multiple.to_array(),
         }
     }
+}
+
+/// Into what a camera path splits at the first surface that scatters it: each
+/// draws the numbers of an index of its own from the pixel's [`Sampler`].
+#[derive(Clone, Debug)]
+pub struct Split {
+    /// Ways in which it goes on.
+    pub branches: Range<u32>,
+    /// Samples of the light that arrives there directly.
+    pub light_samples: Range<u32>,
 }
 
 /// A path on its way.
@@ -151,29 +161,32 @@ impl<'a, const F: u32> PathTracer<'a, F> {
 
     /// The light that arrives along `ray` at the camera. From the first surface
     /// that scatters on, the path goes on in several ways, the average of which
-    /// counts; each draws the numbers of another `branches` index from `sampler`.
-    pub fn trace(&self, ray: Ray, sampler: &mut Sampler, branches: Range<u32>) -> PathResult {
+    /// counts, and so does that of several light samples there.
+    pub fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult {
         let mut result = PathResult::default();
         let mut trunk = Path::from_camera(ray);
         let Some(surface) = self.next_surface(&mut trunk, &mut result) else {
             return result;
         };
         let layers = self.scene.layers(&surface);
-        let share = 1.0 / branches.len() as f32;
-        for index in branches {
-            sampler.set_index(index);
+        let direct = mean(split.light_samples, sampler, |sampler, result| {
+            self.connect(&trunk, &surface, &layers, sampler, result);
+        });
+        let indirect = mean(split.branches, sampler, |sampler, result| {
             let mut path = trunk.clone();
-            let mut rest = PathResult::default();
-            let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler, &mut rest);
+            let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             while goes_on {
-                let Some(surface) = self.next_surface(&mut path, &mut rest) else {
+                let Some(surface) = self.next_surface(&mut path, result) else {
                     break;
                 };
                 let layers = self.scene.layers(&surface);
-                goes_on = self.scatter(&mut path, &surface, &layers, sampler, &mut rest);
+                self.connect(&path, &surface, &layers, sampler, result);
+                goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             }
-            result.radiance += rest.radiance * Rgb::splat(share);
-            result.rays += rest.rays;
+        });
+        for part in [direct, indirect] {
+            result.radiance += part.radiance;
+            result.rays += part.rays;
         }
         result
     }
@@ -230,27 +243,37 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
     }
 
-    /// Light samples at a surface, and the direction in which the path goes on;
-    /// false when it ends.
+    /// Adds a light sample at a surface that `path` has come to.
+    fn connect(
+        &self,
+        path: &Path,
+        surface: &Surface,
+        layers: &Layers,
+        sampler: &mut Sampler,
+        result: &mut PathResult,
+    ) {
+        if !has::<F>(Features::LIGHT_SAMPLING) || !layers.has_smooth() {
+            return;
+        }
+        let wo = -path.ray.direction;
+        let direct = self.direct(surface, layers, wo, path.vertex, sampler, &mut result.rays);
+        if path.multiple {
+            result.radiance.multiple += path.throughput * direct.total();
+        } else {
+            result.radiance += direct * path.throughput;
+        }
+    }
+
+    /// The direction in which the path goes on from a surface; false when it ends.
     fn scatter(
         &self,
         path: &mut Path,
         surface: &Surface,
         layers: &Layers,
         sampler: &mut Sampler,
-        result: &mut PathResult,
     ) -> bool {
         let wo = -path.ray.direction;
         let vertex = path.vertex;
-        if has::<F>(Features::LIGHT_SAMPLING) && layers.has_smooth() {
-            let direct = self.direct(surface, layers, wo, vertex, sampler, &mut result.rays);
-            if path.multiple {
-                result.radiance.multiple += path.throughput * direct.total();
-            } else {
-                result.radiance += direct * path.throughput;
-            }
-        }
-
         let choice = if has::<F>(Features::MIXES) {
             sampler.get_1d(Dimension::closure_choice(vertex))
         } else {
@@ -363,7 +386,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let Some(radiance) = self.visible(surface, &light, rays) else {
             return ByOrder::ZERO;
         };
-        // The balance heuristic's weight over the density; a delta light has no rival.
+        // The power heuristic's weight over the density; a delta light has no rival.
         let factor = if light.delta {
             1.0 / light.pdf
         } else {
@@ -413,8 +436,24 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     }
 }
 
+/// The mean of what `trace` finds for these indices of `sampler`; rays add up.
+fn mean(
+    indices: Range<u32>,
+    sampler: &mut Sampler,
+    mut trace: impl FnMut(&mut Sampler, &mut PathResult),
+) -> PathResult {
+    let share = 1.0 / indices.len() as f32;
+    let mut sum = PathResult::default();
+    for index in indices {
+        sampler.set_index(index);
+        trace(sampler, &mut sum);
+    }
+    sum.radiance = sum.radiance * Rgb::splat(share);
+    sum
+}
+
 impl Vertex {
-    /// The balance heuristic's weight of a direction found by BSDF sampling
+    /// The power heuristic's weight of a direction found by BSDF sampling
     /// that light sampling would have found with density `light_pdf` (sr⁻¹).
     fn weight(&self, light_pdf: f32) -> f32 {
         match self.pdf {

@@ -1,13 +1,12 @@
 //! Passes over the film, in parallel over its tiles, until a limit is reached.
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
 use super::kernel::pass_for;
-use super::path::PathTracer;
+use super::path::{PathTracer, Split};
 use crate::camera::Camera;
 use crate::film::{Aov, Film, FilmTile, PixelFilter};
 use crate::sampler::{Dimension, Sampler};
@@ -87,15 +86,32 @@ pub(super) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// The branches of sample number `index`, counted through the samples of a
-    /// pixel that has been given `planned` of them after its pilot samples.
-    fn branches(&self, planned: u32, index: u32) -> Range<u32> {
+    /// How sample number `index` of a pixel splits that has been given `planned`
+    /// branches after its pilot samples.
+    fn split(&self, planned: u32, index: u32) -> Split {
         let mean = self.request.scene.branches;
         let piloted = index.min(PILOT_SAMPLES);
-        let first = piloted * mean + (index - piloted) * planned;
-        let count = if index < PILOT_SAMPLES { mean } else { planned };
-        first..first + count
+        // Numbered on through the samples of the pixel.
+        let numbers = |pilot: u32, planned: u32| {
+            let first = piloted * pilot + (index - piloted) * planned;
+            let count = if index < PILOT_SAMPLES {
+                pilot
+            } else {
+                planned
+            };
+            first..first + count
+        };
+        Split {
+            branches: numbers(mean, planned),
+            light_samples: numbers(light_samples(mean), light_samples(planned)),
+        }
     }
+}
+
+/// How many light samples go with so many branches: half as many, as they cost
+/// as much and bring less of the noise.
+fn light_samples(branches: u32) -> u32 {
+    branches.div_ceil(2)
 }
 
 /// What to render, and how far.
@@ -241,7 +257,7 @@ fn render_sample<const F: u32>(
         ..
     } = *job.request;
     let mut sampler = Sampler::new(seed, pixel, index);
-    let branches = job.branches(tile.branches(pixel), index);
+    let split = job.split(tile.branches(pixel), index);
     let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
     let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
     let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
@@ -252,7 +268,7 @@ fn render_sample<const F: u32>(
     let ray = camera.ray(raster, lens);
     // Depth counts along the view axis, not along the ray.
     let depth_scale = ray.direction.dot(camera.forward());
-    let result = tracer.trace(ray, &mut sampler, branches);
+    let result = tracer.trace(ray, &mut sampler, split);
     tile.add(pixel, &result.to_sample(depth_scale));
     result.rays
 }

@@ -96,7 +96,7 @@ impl<N, I> Microsurface<N, I> {
     /// (1 + Λ_i)/(1 + Λ_i + Λ_o). Transmission, where the depth is that of the
     /// other side (Heitz et al. 2016, § 5.2): (1 + Λ_i) B(1 + Λ_i, 1 + Λ_o).
     #[inline]
-    fn escape<F: Real>(&self, at: At<F>, wo: Vector3<F>) -> F
+    pub(super) fn escape<F: Real>(&self, at: At<F>, wo: Vector3<F>) -> F
     where
         N: Ndf<F>,
     {

@@ -169,17 +169,43 @@ impl<N, I> Microsurface<N, I> {
                 order: 1,
             });
         }
+        let entrance = self.entrance(wi);
+        let mut at = entrance;
         let mut ray = Ray::entering(wi);
         let mut weight = Rgb::white();
         let mut order = 0;
-        while let Some(at) = ray.advance(&self.ndf, rng.draw()) {
+        // The depth of the first facet is exponential, of rate σ(ω_i)/cosθ_i. Of
+        // light that goes up from there and does not leave, so is the depth of
+        // the next one: it need not be known before light goes down or across.
+        let mut known = false;
+        loop {
             let m = self.ndf.sample_visible(at.w, [rng.draw(), rng.draw()]);
             let bounce = self.facets.scatter(at.side, at.w, m, rng);
             weight *= bounce.weight;
             order += 1;
+            let d = bounce.direction;
+            if !known && !bounce.crosses && d.z > F::zero() {
+                ray.direction = d;
+                if rng.draw() < self.escape(entrance, d) {
+                    break;
+                }
+                at = self.entrance(-d);
+                if !Roulette::OF_LIGHT.survives(&mut weight, F::one(), order, rng) {
+                    return None;
+                }
+                continue;
+            }
+            if !known {
+                known = true;
+                ray.depth = -(F::one() - rng.draw()).ln() * (wi.z / entrance.sigma);
+            }
             ray.follow(&bounce);
             if !Roulette::OF_LIGHT.survives(&mut weight, F::one(), order, rng) {
                 return None;
+            }
+            match ray.advance(&self.ndf, rng.draw()) {
+                Some(next) => at = next,
+                None => break,
             }
         }
         Some(Exit {
