@@ -60,13 +60,15 @@ impl<N, I> Microsurface<N, I> {
             .density
     }
 
-    /// A cheap guess of the share of orders ≥ 2: 1 − e^{−3Λ/2} is near that of
-    /// white GGX mirrors for α ≤ 1.
+    /// A cheap guess of the share of orders ≥ 2: 1 − e^{−x} with x = 3Λ/2, the
+    /// exponential by its series, is near that of white GGX mirrors for α ≤ 1.
     #[inline]
     fn multiple_share<F: Real>(&self) -> F
     where
         N: Ndf<F>,
     {
-        (-(-F::of(1.5) * self.steep_lambda()).exp_m1()).max(F::of(LEAST_SHARE))
+        let x = F::of(1.5) * self.steep_lambda();
+        let falls = (F::one() + x * (F::one() + F::of(0.5) * x)).recip();
+        (F::one() - falls).max(F::of(LEAST_SHARE))
     }
 }
