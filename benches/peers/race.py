@@ -11,6 +11,8 @@ Efficiency is relMSE × CPU seconds; less is better, and its ratio between two
 renderers is that of their times at equal error. relMSE is that of `smithwalk
 diff`: ε = 0.01, the worst 0.1 % of the pixels left out.
 
+References that an earlier run left in DIR are kept, as their times do not count.
+
 Writes for each scene race-SCENE.csv, one row for each image, which `smithwalk
 converge --peer` reads, and race.md, the tables; with --docs the tables become a
 section of docs/benchmarks.md. What is not installed is left out, and said so.
@@ -150,14 +152,16 @@ def race(args, scene, contender):
     folder = os.path.join(args.output, scene, re.sub(r"\W+", "-", contender.name))
     os.makedirs(folder, exist_ok=True)
     references = [{"spp": args.reference_spp, "seed": 101 + i,
-                   "out": os.path.join(folder, f"reference-{i}.exr")} for i in range(2)]
+                   "out": os.path.join(folder, f"reference-{args.reference_spp}-{i}.exr")}
+                  for i in range(2)]
     images = [{"spp": spp, "seed": seed, "out": os.path.join(folder, f"{spp}-{seed}.exr")}
               for spp in args.spp for seed in range(1, args.seeds + 1)]
-    version, times = contender.render(references + images, folder)
+    wanted = [job for job in references if not os.path.exists(job["out"])]
+    version, times = contender.render(wanted + images, folder)
     a, b = (job["out"] for job in references)
     floor = rel_mse(args, a, b) / 2
     rows = []
-    for job, time in zip(images, times[2:]):
+    for job, time in zip(images, times[len(wanted):]):
         error = (rel_mse(args, job["out"], a) + rel_mse(args, job["out"], b)) / 2 - floor
         rows.append({"name": contender.name, "spp": job["spp"], "seed": job["seed"],
                      **time, "rel_mse": error, "floor": floor})

@@ -73,6 +73,14 @@ pub struct Split {
     pub light_samples: Range<u32>,
 }
 
+impl std::ops::AddAssign for PathResult {
+    /// Adds the light and the rays of a part of the path behind its first surface.
+    fn add_assign(&mut self, rest: Self) {
+        self.radiance += rest.radiance;
+        self.rays += rest.rays;
+    }
+}
+
 /// A path on its way.
 #[derive(Clone)]
 struct Path {
@@ -169,10 +177,12 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             return result;
         };
         let layers = self.scene.layers(&surface);
-        let direct = mean(split.light_samples, sampler, |sampler, result| {
-            self.connect(&trunk, &surface, &layers, sampler, result);
-        });
-        let indirect = mean(split.branches, sampler, |sampler, result| {
+        if has::<F>(Features::LIGHT_SAMPLING) {
+            result += mean(split.light_samples, sampler, |sampler, result| {
+                self.connect(&trunk, &surface, &layers, sampler, result);
+            });
+        }
+        result += mean(split.branches, sampler, |sampler, result| {
             let mut path = trunk.clone();
             let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             while goes_on {
@@ -184,10 +194,6 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             }
         });
-        for part in [direct, indirect] {
-            result.radiance += part.radiance;
-            result.rays += part.rays;
-        }
         result
     }
 

@@ -4,11 +4,11 @@ use rand::Rng;
 
 /// A source of uniform numbers in [0, 1): 0 may come, 1 never does.
 ///
-/// A walk draws in a fixed order, the most telling first: the depth of the
-/// first collision, the two numbers of the first micro-normal, then what its
-/// facet needs (the Fresnel choice, or the two numbers of a cosine lobe). A
-/// renderer may feed well-stratified numbers to these and a plain generator
-/// to the rest.
+/// A walk draws in a fixed order, the most telling first: for its first facet
+/// the two numbers of the micro-normal, what the facet needs (the Fresnel
+/// choice, or the two numbers of a cosine lobe), and whether the light leaves
+/// or how deep it was; the walks of evaluation begin with the depth. A renderer
+/// may feed well-stratified numbers to these and a plain generator to the rest.
 pub trait Draw<F> {
     /// The next number.
     fn draw(&mut self) -> F;
