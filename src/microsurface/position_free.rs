@@ -24,6 +24,10 @@ struct Depth<F> {
 /// Stages that are kept without an allocation: steps down of most walks.
 const COMMON: usize = 12;
 
+/// A ray that goes up stays inside with no smaller chance than this: straight
+/// up, where no facet faces it, the phase function of the next one overflows.
+const NEVER: f64 = 1e-30;
+
 struct Stage<F> {
     start: F,
     rate: F,
@@ -55,8 +59,8 @@ impl<F: Real> Depth<F> {
     }
 
     /// Goes up to the next collision at `rate`, given that there is one, and
-    /// returns its probability: climbing through the stages in order, each
-    /// is passed or collided in, whichever exponential is first.
+    /// returns its probability, 0 for none: climbing through the stages in
+    /// order, each is passed or collided in, whichever exponential is first.
     #[inline]
     fn climb(&mut self, rate: F) -> F {
         let mut passing = F::zero();
@@ -68,8 +72,7 @@ impl<F: Real> Depth<F> {
             passing = here * (stage.rate * split);
             collided += stage.start;
         }
-        // A chance without a finite reciprocal never comes true.
-        if collided < F::min_positive_value() {
+        if collided < F::of(NEVER) {
             return F::zero();
         }
         let norm = collided.recip();
@@ -88,6 +91,33 @@ impl<F: Real> Depth<F> {
     }
 }
 
+/// A direction in which the path leaves the surface, at either end.
+struct End<F> {
+    w: Vector3<F>,
+    /// σ(w)
+    sigma: F,
+    /// σ(−w)
+    below: F,
+}
+
+impl<F: Real> End<F> {
+    #[inline]
+    fn new<N: Ndf<F>>(ndf: &N, w: Vector3<F>) -> Self {
+        let [sigma, below] = ndf.projected_areas(w);
+        Self { w, sigma, below }
+    }
+
+    /// Light that comes in from here, at its first facet.
+    #[inline]
+    fn at(&self) -> At<F> {
+        At {
+            side: Side::Above,
+            w: self.w,
+            sigma: self.sigma,
+        }
+    }
+}
+
 impl<N, I> Microsurface<N, I> {
     /// Estimates the value by both walks; `wi` and `wo` are known to link,
     /// and the facets to be mirrors.
@@ -101,18 +131,19 @@ impl<N, I> Microsurface<N, I> {
         N: Ndf<F>,
         I: Facets<F>,
     {
-        tally.add(1, self.first_order(self.entrance(wi), wo, wi));
+        let ends = [wi, wo].map(|w| End::new(&self.ndf, w));
+        tally.add(1, self.first_order(ends[0].at(), wo, wi));
         let mut depth = Depth::new();
-        self.eval_directions(wi, wo, F::one(), &mut depth, rng, tally);
+        self.eval_directions(&ends[0], &ends[1], F::one(), &mut depth, rng, tally);
         rng.next_walk();
-        self.eval_directions(wo, wi, wo.z / wi.z, &mut depth, rng, tally);
+        self.eval_directions(&ends[1], &ends[0], wo.z / wi.z, &mut depth, rng, tally);
     }
 
     /// The part of orders ≥ 2 that a walk from `from` finds, times `scale`.
     fn eval_directions<F: Real>(
         &self,
-        from: Vector3<F>,
-        to: Vector3<F>,
+        from: &End<F>,
+        to: &End<F>,
         scale: F,
         depth: &mut Depth<F>,
         rng: &mut impl Draw<F>,
@@ -122,10 +153,9 @@ impl<N, I> Microsurface<N, I> {
         I: Facets<F>,
     {
         let ndf = &self.ndf;
-        let lambda = ndf.lambda(to);
-        let sigma_to = ndf.projected_area(to);
-        let mut at = self.entrance(from);
-        depth.enter(at.sigma / from.z);
+        let lambda = to.below / to.w.z;
+        let mut at = from.at();
+        depth.enter(at.sigma / from.w.z);
         let mut weight = Rgb::splat(scale);
         let mut order = 1;
         // The density of the path as the other walk would find it, over that
@@ -138,15 +168,11 @@ impl<N, I> Microsurface<N, I> {
             let bounce = self.facets.scatter(Side::Above, at.w, m, rng);
             weight *= bounce.weight;
             let d = bounce.direction;
-            let reversed = if order == 1 {
-                ndf.density(m)
-            } else {
-                ndf.projected_area(d)
-            };
+            let [sigma, sigma_back] = ndf.projected_areas(d);
             ratio = bounded(if order == 1 {
-                at.sigma / reversed
+                at.sigma / ndf.density(m)
             } else {
-                ratio * (at.sigma / reversed)
+                ratio * (at.sigma / sigma)
             });
             if !Roulette::OF_CHANCE.survives(&mut weight, scale, order, rng) {
                 return;
@@ -155,7 +181,7 @@ impl<N, I> Microsurface<N, I> {
             at = At {
                 side: Side::Above,
                 w: -d,
-                sigma: ndf.projected_area(-d),
+                sigma: sigma_back,
             };
             let rate = at.sigma / d.z.abs();
             // A level ray collides where it is.
@@ -166,15 +192,19 @@ impl<N, I> Microsurface<N, I> {
                     // No dice for the chance to stay inside, which the other
                     // walk's weight could not know of: weighted by it, no
                     // connection outgrows the value.
-                    weight = weight * depth.climb(rate);
+                    let chance = depth.climb(rate);
+                    if chance == F::zero() {
+                        return;
+                    }
+                    weight = weight * chance;
                 }
             }
             order += 1;
             // Connect to the far end.
-            let phase = self.facets.phase(ndf, at, to, false, m);
+            let phase = self.facets.phase(ndf, at, to.w, false, m);
             if phase.density > F::zero() {
                 // σ(w) p is D(h)/4 without Fresnel.
-                let other = ratio * (F::of(4.0) * at.sigma * phase.density / sigma_to);
+                let other = ratio * (F::of(4.0) * at.sigma * phase.density / to.sigma);
                 let value = phase.density * depth.escape(lambda) / (F::one() + other);
                 tally.add(order, weight * phase.weight * value);
             }

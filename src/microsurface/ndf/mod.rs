@@ -24,6 +24,19 @@ pub trait Ndf<F: Real>: Copy {
     /// projected along w, per unit of macroscopic area. σ(w) − σ(−w) = w_z.
     fn projected_area(&self, w: Vector3<F>) -> F;
 
+    /// σ(w) and σ(−w), for little more than one of them. Adding up what lies
+    /// below the horizon and w_z loses no digits.
+    #[inline]
+    fn projected_areas(&self, w: Vector3<F>) -> [F; 2] {
+        if w.z >= F::zero() {
+            let below = self.projected_area(-w);
+            [below + w.z, below]
+        } else {
+            let below = self.projected_area(w);
+            [below, below - w.z]
+        }
+    }
+
     /// Smith's Λ(w) = σ(−w) / w_z, for w_z ≥ 0 (∞ at w_z = 0).
     #[inline]
     fn lambda(&self, w: Vector3<F>) -> F {
