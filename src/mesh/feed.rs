@@ -48,9 +48,8 @@ pub(super) fn parse<R: BufRead + Send>(
                 let _ = sender.send(block);
             }
         });
-        // Moved in, so that the channel is closed when the parser is done.
-        let receiver = receiver;
         let result = parse(&mut || receiver.recv().ok());
+        // No more is taken: the other thread must not wait for room.
         drop(receiver);
         result
     })
