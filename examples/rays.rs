@@ -77,10 +77,10 @@ fn row(path: &Path) -> Result<()> {
         0 => "–".to_owned(),
         _ => format!("{:.2}", count as f64 / seconds / 1e6),
     };
-    let name = path.parent().and_then(Path::file_name).unwrap_or_default();
+    let folder = path.parent().and_then(Path::file_name);
     println!(
         "| {} | {:.2} | {:.0} % | {} | {} | {} | {} | {:.0} % |",
-        name.display(),
+        folder.unwrap_or_default().to_string_lossy(),
         queries.len() as f64 / 1e6,
         100.0 * any.len() as f64 / queries.len() as f64,
         rate(queries.len(), whole),
