@@ -46,6 +46,59 @@ fn a_mesh_holds_what_its_file_says() {
     assert!(mesh.positions.capacity() > mesh.positions.len());
 }
 
+/// More than the parser is given as one object, and than it is given at once.
+const MANY: usize = 100_000;
+
+#[test]
+fn a_mesh_of_many_faces_is_one_mesh_in_the_order_of_its_file() {
+    use std::fmt::Write;
+    let (mut vertices, mut faces) = (String::new(), String::new());
+    for i in 0..MANY {
+        writeln!(vertices, "v {i} {} 0\nvn 0 0 {}", i % 2, i + 1).unwrap();
+        if i > 2 {
+            // Vertices far apart, so that some are yet to come everywhere.
+            let far = (i * 7919) % MANY + 1;
+            let (a, b) = (i - 1, i);
+            let corner = |v: usize| format!("{v}//{v}");
+            let third = if far == a || far == b { i + 1 } else { far };
+            writeln!(faces, "f {} {} {}", corner(a), corner(b), corner(third)).unwrap();
+        }
+    }
+    let read = |text: String| {
+        let (mesh, repairs) = read(&text);
+        let corners: Vec<[[f32; 3]; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]))
+            .collect();
+        (corners, mesh.normals, repairs)
+    };
+    let (after, normals, repairs) = read(format!("{vertices}{faces}"));
+    let (before, ..) = read(format!("{faces}{vertices}"));
+    assert_eq!(repairs, []);
+    assert_eq!(after.len(), MANY - 3);
+    assert!(after == before, "the order of vertices and faces matters");
+    assert_eq!(after[0][0], [1.0, 1.0, 0.0]);
+    assert_eq!(after[MANY - 4][0], [(MANY - 3) as f32, 1.0, 0.0]);
+    assert!(normals.is_some());
+}
+
+#[test]
+fn the_line_of_a_mistake_is_known_far_into_a_file_and_on_one_thread() {
+    let text = format!("{}v 1 1.2.3 0\n{SQUARE}", "v 1 2 3\n".repeat(MANY));
+    let error = || Mesh::read(text.as_bytes(), "mesh.obj", Wanted::ALL).expect_err("1.2.3");
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1);
+    let alone = one_thread.build().unwrap().install(error);
+    assert_eq!(
+        alone.to_string(),
+        format!(
+            "mesh.obj:{}: position parse error in `v 1 1.2.3 0`",
+            MANY + 1
+        )
+    );
+    assert_eq!(error(), alone);
+}
+
 #[test]
 fn what_is_not_there_takes_no_memory() {
     let (mesh, _) = read(&format!("{SQUARE}f 1 2 3 4\n"));

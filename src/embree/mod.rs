@@ -11,8 +11,12 @@
 
 mod device;
 mod ray;
+#[cfg(feature = "record-rays")]
+mod record;
 mod scene;
 
 pub use device::{Device, EmbreeError};
 pub use ray::{Hit, Ray};
+#[cfg(feature = "record-rays")]
+pub use record::{Query, recorded};
 pub use scene::{Accelerator, Geometry, SharedMesh, Vertices};

@@ -169,6 +169,8 @@ impl Accelerator {
     #[must_use]
     #[inline]
     pub fn intersect(&self, ray: Ray) -> Option<Hit> {
+        #[cfg(feature = "record-rays")]
+        super::record::note(super::Query::Intersect(ray));
         let hit = self.query(ray);
         if hit.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
             return None;
@@ -204,6 +206,8 @@ impl Accelerator {
     #[must_use]
     #[inline]
     pub fn occluded(&self, ray: Ray) -> bool {
+        #[cfg(feature = "record-rays")]
+        super::record::note(super::Query::Occluded(ray));
         let mut record = ray.to_embree();
         // SAFETY: RTCRay has the library's size and alignment (repr(C, align(16))
         // in the bindings); the scene is committed; null means the defaults.

@@ -231,6 +231,8 @@ pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -
     let tracer = PathTracer::<F>::new(job.request.scene, job.describe_first);
     tiles
         .par_iter_mut()
+        // A few tiles can cost most of a pass: none waits behind another.
+        .with_max_len(1)
         .map(|tile| {
             let mut rays = 0;
             for pixel in tile.window().pixels() {

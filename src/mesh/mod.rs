@@ -1,9 +1,11 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
 //! `tobj` reads them. What it is fed goes through `lines`, which knows the
-//! line of every mistake and leaves out what the scene has no use for.
+//! line of every mistake and leaves out what the scene has no use for. The two
+//! take turns on one thread, or have one each.
 
 mod assemble;
+mod feed;
 mod lines;
 
 use std::fmt;
@@ -143,7 +145,7 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::load`]; `source_name` stands for the file's name.
     pub fn read(
-        reader: impl BufRead,
+        reader: impl BufRead + Send,
         source_name: &str,
         wanted: Wanted,
     ) -> Result<(Self, Vec<Repair>), MeshError> {
@@ -153,8 +155,8 @@ impl Mesh {
             single_index: true,
             ..Default::default()
         };
-        let loaded = tobj::load_obj_buf(&mut lines, &options, lines::material_of_its_own);
-        let result = match lines.finish(loaded) {
+        let (loaded, last) = feed::parse(&mut lines, &options);
+        let result = match lines.finish(loaded, last) {
             Ok((models, names, repairs)) => assemble::assemble(models, names, repairs, wanted),
             Err(problems) => Err(problems),
         };
