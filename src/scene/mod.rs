@@ -204,6 +204,13 @@ impl Scene {
     #[must_use]
     #[inline]
     pub fn layers(&self, surface: &Surface) -> Layers {
+        self.closures(surface)
+    }
+
+    /// The closures at a surface point, for the features `F`.
+    #[must_use]
+    #[inline]
+    pub fn closures<const F: u32>(&self, surface: &Surface) -> Layers<F> {
         self.materials[surface.material].layers(&self.textures, surface)
     }
 
