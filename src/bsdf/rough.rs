@@ -48,10 +48,10 @@ impl Method {
     }
 }
 
-/// How often orders above the first are evaluated, per Λ: always from a Λ of
-/// 1/128 on. This and [`TURN`] are the roundest that measured well
+/// How often orders above the first are evaluated: the square of this times Λ,
+/// always from a Λ of 1/128 on. This and [`TURN`] are the roundest that measured well
 /// (docs/estimators.md).
-const CHANCE_PER_LAMBDA: f32 = 128.0;
+const ROOT_CHANCE_PER_LAMBDA: f32 = 128.0;
 
 /// How far towards grazing one facet well turns light, over α. A facet of slope
 /// α turns it by twice that.
@@ -162,7 +162,8 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
                 z: INSIDE,
             }
         };
-        (CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing)).clamp(LEAST_CHANCE, 1.0)
+        let root = ROOT_CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing);
+        (root * root).clamp(LEAST_CHANCE, 1.0)
     }
 
     /// The density that stands in for the sampler's, sr⁻¹.
