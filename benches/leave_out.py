@@ -3,8 +3,9 @@
 
     benches/leave_out.py [--smithwalk BINARY] [--spp N] [--repeats N]
 
-Three tables for docs/benchmarks.md. The first renders every scene of scenes/
-with the kernel that fits best and with the one that has everything (`--all-in`).
+Three tables, two for docs/leave-out.md and the last for docs/benchmarks.md. The
+first renders every scene of scenes/, and the simplest one made plainer, with the
+kernel that fits best and with the one that has everything (`--all-in`).
 The second turns single features on and off by `-D`: used, unused but in the
 kernel, left out. The third renders with one thread and with two. The commands
 of a row take turns, and the order changes from repeat to repeat, so that
@@ -26,12 +27,26 @@ import section
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 
+PAGE = os.path.join(ROOT, "docs", "leave-out.md")
+TITLE = "# Leaving out what a scene does not need\n"
 GOLD = "{conductor: {roughness: 0.8, color: [1, 0.71, 0.29]}}"
 BRUSHED = "{conductor: {roughness: 0.8, color: [1, 0.71, 0.29], anisotropy: 0.5}}"
+
+# What makes the gold sphere plainer still.
+PLAINER = (
+    ("single scattering", ["sampling.estimator=single"]),
+    ("Lambertian", ["materials.gold={diffuse: {color: 0.8}}"]),
+    ("Lambertian, no lamp", ["materials.gold={diffuse: {color: 0.8}}", "lights=[]"]),
+)
 
 # Feature as `info` names it, the scene, and what makes it used and unused.
 FEATURES = (
     ("multiple scattering", "gold_sphere", None, "sampling.estimator=single"),
+    ("metals", "gold_sphere", None, "materials.gold={diffuse: {color: 0.8}}"),
+    ("diffuse facets", "gold_sphere", "materials.gold={rough_diffuse: {roughness: 0.8}}",
+     "materials.gold={diffuse: {color: 0.8}}"),
+    ("Beckmann slopes", "gold_sphere",
+     "materials.gold={conductor: {roughness: 0.8, color: [1, 0.71, 0.29], distribution: beckmann}}", None),
     ("anisotropy", "gold_sphere", f"materials.gold={BRUSHED}", None),
     ("transmission", "gold_sphere", "materials.gold={dielectric: {roughness: 0.8}}", None),
     ("mixes", "gold_sphere", f"materials.gold={{mix: {{a: {GOLD}, b: {GOLD}}}}}", None),
@@ -103,13 +118,15 @@ def whole_scenes(args, folder):
     """Every scene: the kernel that fits best against the one with everything."""
     lines = ["| scene | features in use | in its kernel | everything in, ns | fitting, ns | saved (range) "
              "| kB | start-up, ms |", "|---|---|---|---|---|---|---|---|"]
-    for scene in sorted(os.listdir(os.path.join(ROOT, "scenes"))):
-        if not os.path.exists(scene_file(scene)):
-            continue
-        print(f"{scene} …", file=sys.stderr, flush=True)
-        used, inside, size, start = info(args, scene, [])
-        full, lean = turns(args, scene, [["--all-in"], []], folder)
-        lines.append(f"| {scene} | {len(used)} | {len(inside)} | {per_sample(args, scene, full):.0f} "
+    rows = [(scene, scene, []) for scene in sorted(os.listdir(os.path.join(ROOT, "scenes")))
+            if os.path.exists(scene_file(scene))]
+    rows += [(f"gold_sphere, {what}", "gold_sphere", [x for change in changes for x in ("-D", change)])
+             for what, changes in PLAINER]
+    for name, scene, changes in rows:
+        print(f"{name} …", file=sys.stderr, flush=True)
+        used, inside, size, start = info(args, scene, changes)
+        full, lean = turns(args, scene, [["--all-in", *changes], changes], folder)
+        lines.append(f"| {name} | {len(used)} | {len(inside)} | {per_sample(args, scene, full):.0f} "
                      f"| {per_sample(args, scene, lean):.0f} | {saving(full, lean)} "
                      f"| {size / 1e3:.0f} | {1e3 * start:.1f} |")
     return lines
@@ -166,7 +183,7 @@ def main():
             "everything, and in the kernel that fits. Between used and unused the picture, and so the",
             "work, is another; memory is what `info` lists, without Embree's own.", "",
             *features(args, folder)])
-        section.replace("What leaving out saves", text)
+        section.replace("What it saves", text, PAGE, TITLE)
         scaling = "\n".join([f"Wall time of rendering. {said}", "", *threads(args, folder)])
         section.replace("Threads", scaling)
     print(text + "\n\n" + scaling)

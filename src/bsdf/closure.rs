@@ -7,6 +7,7 @@ use crate::color::Rgb;
 use crate::microsurface::{
     self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally,
 };
+use crate::scene::{Features, has};
 
 /// Everything that a surface can scatter with.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +54,30 @@ macro_rules! each_rough {
 const MIN_COS: f32 = 1e-7;
 
 impl Closure {
+    /// Whether code for the features `F` has to know this closure. Asked before
+    /// a match, it takes the other arms out of it.
+    #[inline(always)]
+    pub(super) fn is_in<const F: u32>(&self) -> bool {
+        let (metals, glass, matte, beckmann) = (
+            has::<F>(Features::METALS),
+            has::<F>(Features::TRANSMISSION),
+            has::<F>(Features::DIFFUSE_FACETS),
+            has::<F>(Features::BECKMANN),
+        );
+        match self {
+            Self::Lambert(_) => true,
+            Self::Mirror(_) => metals,
+            Self::Interface(_) => glass,
+            Self::Transparent(_) => has::<F>(Features::TRANSPARENCY),
+            Self::GgxConductor(rough) => metals && rough.is_in::<F>(),
+            Self::BeckmannConductor(rough) => metals && beckmann && rough.is_in::<F>(),
+            Self::GgxDielectric(rough) => glass && rough.is_in::<F>(),
+            Self::BeckmannDielectric(rough) => glass && beckmann && rough.is_in::<F>(),
+            Self::GgxDiffuse(rough) => matte && rough.is_in::<F>(),
+            Self::BeckmannDiffuse(rough) => matte && beckmann && rough.is_in::<F>(),
+        }
+    }
+
     /// Whether all of its light goes into single directions, so that `eval`
     /// and `pdf` have nothing to say.
     #[must_use]
@@ -66,7 +91,7 @@ impl Closure {
     /// Draws a direction; see the contract of [`crate::bsdf`]. The one place
     /// that refuses degenerate samples: what comes back is a finite unit
     /// direction with a finite, non-negative, non-zero weight.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return None;
@@ -86,7 +111,7 @@ impl Closure {
 
     /// Adds f·|cosθ_i| or an estimate of it, sr⁻¹, to `tally`, order by order;
     /// nothing for delta closures.
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, wo: Vec3, wi: Vec3, rng: &mut impl Draw<f32>, tally: &mut impl Tally<f32>) {
         if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
             return;
@@ -99,7 +124,7 @@ impl Closure {
 
     /// The density that multiple importance sampling uses, sr⁻¹; zero for
     /// delta closures.
-    #[inline]
+    #[inline(always)]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
             return 0.0;

@@ -249,11 +249,17 @@ impl Draw<f32> for SobolPoint {
 
 /// How wide a distribution of normals is.
 pub trait Width: Ndf<f32> {
+    /// The width from which the position-free estimator measured better than
+    /// two walks.
+    const POSITION_FREE_FROM: f32;
+
     /// The α of the isotropic surface that the table is asked for.
     fn width(&self) -> f32;
 }
 
 impl Width for Ggx<f32> {
+    const POSITION_FREE_FROM: f32 = 0.0;
+
     #[inline]
     fn width(&self) -> f32 {
         (self.alpha_x * self.alpha_y).sqrt()
@@ -261,6 +267,8 @@ impl Width for Ggx<f32> {
 }
 
 impl Width for Beckmann<f32> {
+    const POSITION_FREE_FROM: f32 = 0.15;
+
     #[inline]
     fn width(&self) -> f32 {
         (self.alpha_x * self.alpha_y).sqrt()

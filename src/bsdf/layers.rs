@@ -6,6 +6,7 @@ use glam::Vec3;
 use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
 use crate::microsurface::{self as model, Draw, Tally};
+use crate::scene::{Features, has};
 
 /// The most closures that a material may flatten to.
 pub const MAX_LAYERS: usize = 8;
@@ -39,9 +40,10 @@ pub struct ScatterSample {
 }
 
 /// All closures at a hit, with the geometric normal that tells reflection from
-/// transmission.
+/// transmission. What is done with them is compiled for the features `F`:
+/// without mixes there is at most one, of share one.
 #[derive(Clone, Debug)]
-pub struct Layers {
+pub struct Layers<const F: u32 = { Features::EVERYTHING.bits() }> {
     layers: ArrayVec<Layer, MAX_LAYERS>,
     /// Geometric normal on the viewer's side, world space.
     normal: Vec3,
@@ -49,7 +51,7 @@ pub struct Layers {
     total: f32,
 }
 
-impl Layers {
+impl<const F: u32> Layers<F> {
     /// None yet, on a surface with this geometric normal (viewer's side).
     #[must_use]
     pub fn new(normal: Vec3) -> Self {
@@ -73,8 +75,9 @@ impl Layers {
 
     /// Whether any closure can be met by light samples.
     #[must_use]
+    #[inline(always)]
     pub fn has_smooth(&self) -> bool {
-        self.layers.iter().any(|layer| !layer.closure.is_delta())
+        self.known().any(|layer| !layer.closure.is_delta())
     }
 
     /// The share of light that goes straight through, per channel.
@@ -88,8 +91,12 @@ impl Layers {
     }
 
     /// Chooses a closure by its share with `choice` in [0, 1), and samples it.
+    #[inline]
     pub fn sample(&self, wo: Vec3, choice: f32, rng: &mut impl Draw<f32>) -> Option<ScatterSample> {
         let layer = self.choose(choice)?;
+        if !layer.closure.is_in::<F>() {
+            return None;
+        }
         let sample = layer.closure.sample(layer.frame.to_local(wo), rng)?;
         let wi = layer.frame.to_world(sample.wi);
         if !self.same_side(wi, sample.wi.z) {
@@ -98,7 +105,11 @@ impl Layers {
         Some(ScatterSample {
             wi,
             // share / (share / total)
-            weight: sample.weight * self.total,
+            weight: if has::<F>(Features::MIXES) {
+                sample.weight * self.total
+            } else {
+                sample.weight
+            },
             order: sample.order,
             delta: layer.closure.is_delta(),
             straight: matches!(layer.closure, Closure::Transparent(_)),
@@ -123,36 +134,60 @@ impl Layers {
         rng: &mut impl Draw<f32>,
         tally: &mut impl Tally<f32>,
     ) {
-        for layer in &self.layers {
+        for layer in self.known() {
             let local = layer.frame.to_local(wi);
-            if self.same_side(wi, local.z) {
+            if !self.same_side(wi, local.z) {
+                continue;
+            }
+            let local_wo = layer.frame.to_local(wo);
+            if has::<F>(Features::MIXES) {
                 let mut scaled = Scaled {
                     share: layer.share,
                     tally: &mut *tally,
                 };
-                layer
-                    .closure
-                    .eval(layer.frame.to_local(wo), local, rng, &mut scaled);
+                layer.closure.eval(local_wo, local, rng, &mut scaled);
+            } else {
+                layer.closure.eval(local_wo, local, rng, tally);
             }
         }
     }
 
     /// The density of the mix for multiple importance sampling, sr⁻¹.
     #[must_use]
+    #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let density = |layer: &Layer| {
             let local = layer.frame.to_local(wi);
             if self.same_side(wi, local.z) {
-                layer.closure.pdf(layer.frame.to_local(wo), local) * layer.share
+                layer.closure.pdf(layer.frame.to_local(wo), local)
             } else {
                 0.0
             }
         };
-        let sum: f32 = self.layers.iter().map(density).sum();
+        if !has::<F>(Features::MIXES) {
+            return self.known().next().map_or(0.0, density);
+        }
+        let sum: f32 = self.known().map(|layer| density(layer) * layer.share).sum();
         if sum > 0.0 { sum / self.total } else { 0.0 }
     }
 
+    /// The closures, of kinds that there is code for: all.
+    #[inline(always)]
+    fn known(&self) -> impl Iterator<Item = &Layer> {
+        let most = if has::<F>(Features::MIXES) {
+            MAX_LAYERS
+        } else {
+            1
+        };
+        let layers = self.layers.iter().take(most);
+        layers.filter(|layer| layer.closure.is_in::<F>())
+    }
+
+    #[inline(always)]
     fn choose(&self, choice: f32) -> Option<&Layer> {
+        if !has::<F>(Features::MIXES) {
+            return self.layers.first();
+        }
         let mut rest = choice * self.total;
         for layer in &self.layers {
             rest -= layer.share;

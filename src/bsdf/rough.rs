@@ -4,13 +4,17 @@ use glam::Vec3;
 
 use super::{Albedos, BsdfSample, MeanWeight, Width, from_model, to_model};
 use crate::color::Rgb;
-use crate::microsurface::{Draw, Estimator, Microsurface, Tally};
+use crate::microsurface::{self as model, Draw, Estimator, Microsurface, Tally, Vector3};
+use crate::scene::{Features, has};
 
 /// How a rough surface's scattering is computed.
 #[derive(Clone, Copy, Debug)]
 pub enum Method {
     /// All orders, by this estimator.
     Multiple(Estimator),
+    /// The same, but those above the first only as often as they are worth
+    /// their time. For facets whose first order is known in closed form.
+    Thinned(Estimator),
     /// The first order alone: what meets a second facet is lost.
     Single,
     /// The first order, scaled to about the albedo that all orders have
@@ -27,12 +31,46 @@ pub struct Rough<N, I> {
     pub method: Method,
 }
 
+impl<N, I> Rough<N, I> {
+    /// Whether code for the features `F` has to know the method.
+    #[inline(always)]
+    pub(super) fn is_in<const F: u32>(&self) -> bool {
+        has::<F>(Features::MULTIPLE_SCATTERING) || !self.method.is_multiple()
+    }
+}
+
+impl Method {
+    /// Whether it has orders above the first.
+    #[must_use]
+    #[inline(always)]
+    pub fn is_multiple(&self) -> bool {
+        matches!(self, Self::Multiple(_) | Self::Thinned(_))
+    }
+}
+
+/// How often orders above the first are evaluated: the square of this times Λ,
+/// always from a Λ of 1/128 on. This and [`TURN`] are the roundest that measured well
+/// (docs/estimators.md).
+const ROOT_CHANCE_PER_LAMBDA: f32 = 128.0;
+
+/// How far towards grazing one facet well turns light, over α. A facet of slope
+/// α turns it by twice that.
+const TURN: f32 = 1.5;
+
+/// The least chance: what is evaluated stands for no more than 16 that are not,
+/// so that rare bright paths do not show as specks.
+const LEAST_CHANCE: f32 = 1.0 / 16.0;
+
+/// A cosine, of tanθ = 2, that light inside the microsurface can have whatever
+/// the directions outside are.
+const INSIDE: f32 = 0.447_213_6;
+
 impl<N: Width, I: MeanWeight> Rough<N, I> {
     /// One walk, or one visible normal for single scattering.
     #[inline]
     pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
         let exit = match self.method {
-            Method::Multiple(_) => self.surface.sample(to_model(wo), rng),
+            Method::Multiple(_) | Method::Thinned(_) => self.surface.sample(to_model(wo), rng),
             Method::Single => self.surface.sample_single(to_model(wo), rng),
             Method::Compensated(albedos) => {
                 let mut exit = self.surface.sample_single(to_model(wo), rng)?;
@@ -53,7 +91,16 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
     pub fn eval(&self, wo: Vec3, wi: Vec3, rng: &mut impl Draw<f32>, tally: &mut impl Tally<f32>) {
         let (wo, wi) = (to_model(wo), to_model(wi));
         match self.method {
-            Method::Multiple(estimator) => self.surface.eval(estimator, wo, wi, rng, tally),
+            Method::Multiple(estimator) => self.eval_orders(estimator, 1.0, wo, wi, rng, tally),
+            Method::Thinned(estimator) => {
+                let estimator = if self.surface.ndf.width() < N::POSITION_FREE_FROM {
+                    Estimator::TwoWalk
+                } else {
+                    estimator
+                };
+                let chance = self.chance(wo, wi);
+                self.eval_orders(estimator, chance, wo, wi, rng, tally);
+            }
             Method::Single => tally.add(1, self.surface.eval_single(wo, wi, rng)),
             Method::Compensated(albedos) => {
                 let scale = albedos.scale(&self.surface, wo.z);
@@ -62,13 +109,86 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
         }
     }
 
+    /// All orders, those above the first with this `chance`.
+    #[inline]
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        chance: f32,
+        wo: Vector3<f32>,
+        wi: Vector3<f32>,
+        rng: &mut impl Draw<f32>,
+        tally: &mut impl Tally<f32>,
+    ) {
+        let thinned = chance < 1.0;
+        if thinned {
+            tally.add(1, self.surface.eval_single(wo, wi, rng));
+            if rng.draw() >= chance {
+                return;
+            }
+        }
+        let mut orders = Orders {
+            first: if thinned { 2 } else { 1 },
+            scale: chance.recip(),
+            tally,
+        };
+        self.surface.eval(estimator, wo, wi, rng, &mut orders);
+    }
+
+    /// How often orders above the first are evaluated. Their share goes with
+    /// the chance to meet a second facet, Λ, along the most grazing direction
+    /// that one facet can well turn the light to.
+    #[inline]
+    fn chance(&self, wo: Vector3<f32>, wi: Vector3<f32>) -> f32 {
+        let low = if wo.z < wi.z.abs() { wo } else { wi };
+        let across = low.x.hypot(low.y);
+        let up = low.z.abs() - TURN * self.surface.ndf.width() * across;
+        if up <= 0.0 {
+            return 1.0;
+        }
+        let grazing = if up < INSIDE {
+            let stretch = (1.0 - up * up).sqrt() / across;
+            Vector3 {
+                x: low.x * stretch,
+                y: low.y * stretch,
+                z: up,
+            }
+        } else {
+            // Between the axes.
+            let side = INSIDE * std::f32::consts::SQRT_2;
+            Vector3 {
+                x: side,
+                y: side,
+                z: INSIDE,
+            }
+        };
+        let root = ROOT_CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing);
+        (root * root).clamp(LEAST_CHANCE, 1.0)
+    }
+
     /// The density that stands in for the sampler's, sr⁻¹.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let (wo, wi) = (to_model(wo), to_model(wi));
         match self.method {
-            Method::Multiple(_) => self.surface.pdf(wo, wi),
+            Method::Multiple(_) | Method::Thinned(_) => self.surface.pdf(wo, wi),
             Method::Single | Method::Compensated(_) => self.surface.pdf_single(wo, wi),
+        }
+    }
+}
+
+/// Scales orders from `first` on, and drops those below.
+struct Orders<'a, T> {
+    first: u32,
+    scale: f32,
+    tally: &'a mut T,
+}
+
+impl<T: Tally<f32>> Tally<f32> for Orders<'_, T> {
+    #[inline]
+    fn add(&mut self, order: u32, value: model::Rgb<f32>) {
+        if order >= self.first {
+            self.tally.add(order, value * self.scale);
         }
     }
 }

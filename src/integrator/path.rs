@@ -176,7 +176,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let Some(surface) = self.next_surface(&mut trunk, &mut result) else {
             return result;
         };
-        let layers = self.scene.layers(&surface);
+        let layers = self.scene.layers::<F>(&surface);
         if has::<F>(Features::LIGHT_SAMPLING) {
             result += mean(split.light_samples, sampler, |sampler, result| {
                 self.connect(&trunk, &surface, &layers, sampler, result);
@@ -189,7 +189,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 let Some(surface) = self.next_surface(&mut path, result) else {
                     break;
                 };
-                let layers = self.scene.layers(&surface);
+                let layers = self.scene.layers::<F>(&surface);
                 self.connect(&path, &surface, &layers, sampler, result);
                 goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             }
@@ -241,7 +241,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             if !has::<F>(Features::TRANSPARENCY) || path.vertex >= MAX_STRAIGHT {
                 return None;
             }
-            path.throughput *= self.scene.layers(&surface).transparency();
+            path.throughput *= self.scene.layers::<F>(&surface).transparency();
             if path.throughput == Rgb::ZERO {
                 return None;
             }
@@ -254,7 +254,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         &self,
         path: &Path,
         surface: &Surface,
-        layers: &Layers,
+        layers: &Layers<F>,
         sampler: &mut Sampler,
         result: &mut PathResult,
     ) {
@@ -275,7 +275,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         &self,
         path: &mut Path,
         surface: &Surface,
-        layers: &Layers,
+        layers: &Layers<F>,
         sampler: &mut Sampler,
     ) -> bool {
         let wo = -path.ray.direction;
@@ -374,7 +374,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     fn direct(
         &self,
         surface: &Surface,
-        layers: &Layers,
+        layers: &Layers<F>,
         wo: Vec3,
         vertex: u32,
         sampler: &mut Sampler,
@@ -427,7 +427,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 return Some(radiance);
             };
             let blocker = self.scene.surface::<F>(&ray, &hit);
-            radiance *= self.scene.layers(&blocker).transparency();
+            radiance *= self.scene.layers::<F>(&blocker).transparency();
             if radiance.max_element() <= 0.0 {
                 return None;
             }

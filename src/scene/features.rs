@@ -46,11 +46,28 @@ features! {
     SMOOTH_NORMALS = 12, "smooth normals", "normals in memory, an interpolation per hit";
     /// Objects that camera rays pass.
     HIDDEN_OBJECTS = 13, "objects hidden from the camera", "a test per camera ray";
+    /// Conductor closures, mirrors among them.
+    METALS = 14, "metals", "conductor closures in the kernel";
+    /// Microsurfaces of Lambertian facets.
+    DIFFUSE_FACETS = 15, "diffuse facets", "closures of theirs in the kernel";
+    /// Facets with Gaussian slopes.
+    BECKMANN = 16, "Beckmann slopes", "a second distribution in every rough closure";
 }
 
 impl Features {
     /// None.
     pub const NONE: Self = Self(0);
+
+    /// All.
+    pub const EVERYTHING: Self = {
+        let mut all = Self::NONE;
+        let mut i = 0;
+        while i < Self::ALL.len() {
+            all = all.with(Self::ALL[i].0);
+            i += 1;
+        }
+        all
+    };
 
     /// The set with exactly these bits.
     #[must_use]
@@ -115,9 +132,7 @@ mod tests {
 
     #[test]
     fn every_feature_has_a_bit_of_its_own() {
-        let all = Features::ALL
-            .iter()
-            .fold(Features::NONE, |set, (f, ..)| set.with(*f));
+        let all = Features::EVERYTHING;
         assert_eq!(all.len() as usize, Features::ALL.len());
         assert!(
             all.contains(Features::MIXES)

@@ -4,7 +4,7 @@
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3};
 
-use super::Surface;
+use super::{Features, Surface, has};
 use crate::bsdf::{
     Closure, Frame, Interface, Lambert, Layer, Layers, MAX_LAYERS, Method, Mirror, Rough,
 };
@@ -25,10 +25,14 @@ pub enum Number {
 }
 
 impl Number {
-    fn at(self, textures: &[Texture], uv: Vec2) -> f32 {
+    #[inline]
+    fn at<const F: u32>(self, textures: &[Texture], uv: Vec2) -> f32 {
         match self {
             Self::Constant(value) => value,
-            Self::Texture(index, channel) => textures[index].channel(uv.into(), channel),
+            Self::Texture(index, channel) if has::<F>(Features::TEXTURES) => {
+                textures[index].channel(uv.into(), channel)
+            }
+            Self::Texture(..) => left_out(),
         }
     }
 }
@@ -43,9 +47,11 @@ pub enum Tint {
 }
 
 impl Tint {
-    fn at(self, textures: &[Texture], uv: Vec2) -> Rgb {
+    #[inline]
+    fn at<const F: u32>(self, textures: &[Texture], uv: Vec2) -> Rgb {
         match self {
             Self::Constant(value) => value,
+            Self::Texture(..) if !has::<F>(Features::TEXTURES) => left_out(),
             Self::Texture(index) => {
                 let [r, g, b, _] = textures[index].sample(uv.into());
                 Rgb::new(r, g, b)
@@ -69,18 +75,19 @@ pub enum Roughness {
 }
 
 impl Roughness {
-    fn alphas(self, textures: &[Texture], uv: Vec2) -> (f32, f32) {
+    #[inline]
+    fn alphas<const F: u32>(self, textures: &[Texture], uv: Vec2) -> (f32, f32) {
         match self {
             Self::Alpha(x, y) => {
-                let at = |number: Number| number.at(textures, uv).max(0.0);
+                let at = |number: Number| number.at::<F>(textures, uv).max(0.0);
                 (at(x), at(y))
             }
             Self::Blender {
                 roughness,
                 anisotropy,
             } => blender_alphas(
-                roughness.at(textures, uv).clamp(0.0, 1.0),
-                anisotropy.at(textures, uv),
+                roughness.at::<F>(textures, uv).clamp(0.0, 1.0),
+                anisotropy.at::<F>(textures, uv),
             ),
         }
     }
@@ -175,11 +182,11 @@ pub struct WeightedLeaf {
 }
 
 impl WeightedLeaf {
-    fn share_at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+    fn share_at<const F: u32>(&self, textures: &[Texture], uv: Vec2) -> f32 {
         self.factors
             .iter()
             .fold(self.share, |share, (factor, complement)| {
-                let f = factor.at(textures, uv).clamp(0.0, 1.0);
+                let f = factor.at::<F>(textures, uv).clamp(0.0, 1.0);
                 share * if *complement { 1.0 - f } else { f }
             })
     }
@@ -195,15 +202,25 @@ pub struct Material {
 impl Material {
     /// The closures at a point.
     #[must_use]
-    pub fn layers(&self, textures: &[Texture], surface: &Surface) -> Layers {
+    #[inline]
+    pub fn layers<const F: u32>(&self, textures: &[Texture], surface: &Surface) -> Layers<F> {
         let mut layers = Layers::new(surface.geometric_normal);
-        for weighted in &self.leaves {
-            let share = weighted.share_at(textures, surface.uv);
+        let most = if has::<F>(Features::MIXES) {
+            MAX_LAYERS
+        } else {
+            1
+        };
+        for weighted in self.leaves.iter().take(most) {
+            let share = if has::<F>(Features::MIXES) {
+                weighted.share_at::<F>(textures, surface.uv)
+            } else {
+                1.0
+            };
             let isotropic = || Frame::about(surface.normal);
             let (closure, frame) = match &weighted.leaf {
                 Leaf::Emission(..) => continue,
                 Leaf::Lambert(tint) => {
-                    let albedo = tint.at(textures, surface.uv);
+                    let albedo = tint.at::<F>(textures, surface.uv);
                     (Closure::Lambert(Lambert { albedo }), isotropic())
                 }
                 // What goes straight through does so by the true surface: an
@@ -213,8 +230,8 @@ impl Material {
                     Frame::about(surface.geometric_normal),
                 ),
                 Leaf::Rough(rough) => (
-                    rough.closure(textures, surface),
-                    rough.frame(textures, surface),
+                    rough.closure::<F>(textures, surface),
+                    rough.frame::<F>(textures, surface),
                 ),
             };
             layers.push(Layer {
@@ -232,7 +249,8 @@ impl Material {
         let mut sum = Rgb::ZERO;
         for weighted in &self.leaves {
             if let Leaf::Emission(tint, strength) = weighted.leaf {
-                sum += tint.at(textures, uv) * (strength * weighted.share_at(textures, uv));
+                sum += tint.at::<ALL>(textures, uv)
+                    * (strength * weighted.share_at::<ALL>(textures, uv));
             }
         }
         sum
@@ -250,26 +268,30 @@ impl Material {
     #[must_use]
     pub fn albedo(&self, textures: &[Texture], uv: Vec2) -> Rgb {
         let color = |leaf: &Leaf| match leaf {
-            Leaf::Lambert(tint) => tint.at(textures, uv),
+            Leaf::Lambert(tint) => tint.at::<ALL>(textures, uv),
             Leaf::Transparent(color) => *color,
             Leaf::Emission(..) => Rgb::ZERO,
             Leaf::Rough(rough) => match rough.facet {
                 Facet::Metal(fresnel) => Rgb::from(fresnel.reflectance(1.0).0),
                 Facet::Tinted(tint) | Facet::Glass(_, tint) | Facet::Matte(tint) => {
-                    tint.at(textures, uv)
+                    tint.at::<ALL>(textures, uv)
                 }
             },
         };
         self.leaves
             .iter()
-            .map(|l| color(&l.leaf) * l.share_at(textures, uv))
+            .map(|l| color(&l.leaf) * l.share_at::<ALL>(textures, uv))
             .sum()
     }
 }
 
 impl RoughMaterial {
     /// The frame to scatter in; only anisotropic closures need the tangent.
-    fn frame(&self, textures: &[Texture], surface: &Surface) -> Frame {
+    #[inline]
+    fn frame<const F: u32>(&self, textures: &[Texture], surface: &Surface) -> Frame {
+        if !has::<F>(Features::ANISOTROPY) {
+            return Frame::about(surface.normal);
+        }
         let tangent = match self.tangent {
             Tangent::Any => return Frame::about(surface.normal),
             Tangent::Uv => surface.tangent_along_u(),
@@ -278,13 +300,14 @@ impl RoughMaterial {
         Frame::with_tangent(
             surface.normal,
             tangent,
-            self.rotation.at(textures, surface.uv),
+            self.rotation.at::<F>(textures, surface.uv),
         )
     }
 
-    fn closure(&self, textures: &[Texture], surface: &Surface) -> Closure {
-        let (alpha_x, alpha_y) = self.roughness.alphas(textures, surface.uv);
-        let color = |tint: Tint| tint.at(textures, surface.uv);
+    #[inline]
+    fn closure<const F: u32>(&self, textures: &[Texture], surface: &Surface) -> Closure {
+        let (alpha_x, alpha_y) = self.roughness.alphas::<F>(textures, surface.uv);
+        let color = |tint: Tint| tint.at::<F>(textures, surface.uv);
         let eta = |ior: f32| if surface.front { ior } else { 1.0 / ior };
         if alpha_x == 0.0 && alpha_y == 0.0 {
             return match self.facet {
@@ -356,6 +379,15 @@ impl RoughMaterial {
             }
         }
     }
+}
+
+/// For what is asked for too seldom to be compiled for each kernel.
+const ALL: u32 = Features::EVERYTHING.bits();
+
+/// Where a kernel lacks a feature of its scene, which it is chosen not to.
+#[cold]
+fn left_out() -> ! {
+    unreachable!("the kernel has what the scene uses")
 }
 
 /// The least roughness across a groove that is smooth along it.

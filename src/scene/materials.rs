@@ -233,8 +233,10 @@ impl<'a> Names<'a> {
 }
 
 /// The estimator for a material: what the file insists on, or for `auto` the
-/// one that measured best for these facets. The position-free estimator is for
-/// conductors; where it does not exist, two walks do the work.
+/// one that measured best for these facets (docs/estimators.md). The
+/// position-free estimator is for conductors; where it does not exist, two walks
+/// do the work. Orders above the first are thinned where they are faint, which
+/// is decided at every hit: roughness may have a texture, and angles count.
 fn method(
     asked: desc::Estimator,
     scattering: desc::Scattering,
@@ -246,12 +248,16 @@ fn method(
         (desc::Scattering::Single, _) | (_, desc::Estimator::Single) => Method::Single,
         (_, desc::Estimator::Walk) => Method::Multiple(model::Estimator::Walk),
         (_, desc::Estimator::TwoWalk) => Method::Multiple(model::Estimator::TwoWalk),
-        (_, desc::Estimator::Auto | desc::Estimator::PositionFree) if metal => {
+        (_, desc::Estimator::PositionFree) if metal => {
             Method::Multiple(model::Estimator::PositionFree)
         }
-        (_, desc::Estimator::Auto | desc::Estimator::PositionFree) => {
-            Method::Multiple(model::Estimator::TwoWalk)
-        }
+        (_, desc::Estimator::PositionFree) => Method::Multiple(model::Estimator::TwoWalk),
+        (_, desc::Estimator::Auto) => match facet {
+            Facet::Metal(_) | Facet::Tinted(_) => Method::Thinned(model::Estimator::PositionFree),
+            Facet::Glass(..) => Method::Thinned(model::Estimator::TwoWalk),
+            // Their first order is no cheaper than a step of a walk.
+            Facet::Matte(_) => Method::Multiple(model::Estimator::TwoWalk),
+        },
         (_, desc::Estimator::Compensated) => Method::Compensated(albedos(distribution, facet)),
     }
 }

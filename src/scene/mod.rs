@@ -200,10 +200,10 @@ impl Scene {
             .sum()
     }
 
-    /// The closures at a surface point.
+    /// The closures at a surface point, for the features `F`.
     #[must_use]
     #[inline]
-    pub fn layers(&self, surface: &Surface) -> Layers {
+    pub fn layers<const F: u32>(&self, surface: &Surface) -> Layers<F> {
         self.materials[surface.material].layers(&self.textures, surface)
     }
 

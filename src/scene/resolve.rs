@@ -9,14 +9,13 @@ use super::load::Assets;
 use super::materials::{Names, compile_material};
 use super::transform::to_affine;
 use super::{Features, Leaf, Material, Number, Object, Roughness, Scene, SceneMesh, Tangent};
-use crate::bsdf::Method;
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::description::{Assignment, Description, Transform};
 use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::mesh::Mesh;
-use crate::scene::material::{Facet, Tint};
+use crate::scene::material::{Distribution, Facet, Tint};
 use crate::texture::Texture;
 
 /// Everything that keeps a scene from being rendered, a line or more each.
@@ -505,12 +504,20 @@ fn features(scene: &Scene) -> Features {
                         rough.roughness,
                         Roughness::Blender { roughness: Number::Constant(r), .. } if r == 0.0
                     );
-                    let multiple = matches!(rough.method, Method::Multiple(_)) && !smooth;
+                    let multiple = rough.method.is_multiple() && !smooth;
                     set.add_if(Features::MULTIPLE_SCATTERING, multiple);
                     set.add_if(Features::ANISOTROPY, rough.tangent != Tangent::Any);
                     set.add_if(
-                        Features::TRANSMISSION,
-                        matches!(rough.facet, Facet::Glass(..)),
+                        Features::BECKMANN,
+                        rough.distribution == Distribution::Beckmann,
+                    );
+                    set.add_if(
+                        match rough.facet {
+                            Facet::Metal(_) | Facet::Tinted(_) => Features::METALS,
+                            Facet::Glass(..) => Features::TRANSMISSION,
+                            Facet::Matte(_) => Features::DIFFUSE_FACETS,
+                        },
+                        true,
                     );
                 }
             }

@@ -21,10 +21,11 @@ struct Subject {
     lossless: bool,
 }
 
-const METHODS: [Method; 3] = [
+const METHODS: [Method; 4] = [
     Method::Multiple(Estimator::Walk),
     Method::Multiple(Estimator::TwoWalk),
     Method::Multiple(Estimator::PositionFree),
+    Method::Thinned(Estimator::PositionFree),
 ];
 
 /// Both distributions on the facets.
