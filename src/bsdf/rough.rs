@@ -163,7 +163,13 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
             }
         };
         let root = ROOT_CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing);
-        (root * root).clamp(LEAST_CHANCE, 1.0)
+        // Glass reflects so little at one facet that higher orders weigh more.
+        let faint = if I::TRANSMITS && wo.z * wi.z > 0.0 {
+            root
+        } else {
+            root * root
+        };
+        faint.clamp(LEAST_CHANCE, 1.0)
     }
 
     /// The density that stands in for the sampler's, sr⁻¹.
