@@ -354,7 +354,9 @@ fn albedo(subject: &Subject, cos: f64, seed: u64, count: u32) -> Mean {
 
 /// Lossless closures over roughness and angle keep all light: within 1e-3, or
 /// within the score that the largest of as many normal scores passes once in a
-/// thousand choices of seeds (Šidák).
+/// thousand choices of seeds (Šidák). What fails is measured again with a
+/// hundred times the samples: where light grazes steep glass, rare samples hold
+/// so much of the light that a few thousand look too dark, and too certain.
 #[test]
 fn closures_keep_energy() {
     let mut cases = vec![];
@@ -382,7 +384,16 @@ fn closures_keep_energy() {
         .collect();
     let mut worst = (0.0, String::new());
     let mut failed = vec![];
-    for ((subject, cos), mean) in cases.iter().zip(&means) {
+    let fails = |mean: &Mean| {
+        let off = (mean.value - 1.0).abs();
+        off >= 1e-3 && off >= bound * mean.error
+    };
+    for (k, ((subject, cos), mean)) in cases.iter().zip(means).enumerate() {
+        let mean = if fails(&mean) {
+            albedo(subject, *cos, (cases.len() + k) as u64, 600_000)
+        } else {
+            mean
+        };
         let off = mean.value - 1.0;
         let score = off / mean.error;
         let line = format!(
@@ -392,7 +403,7 @@ fn closures_keep_energy() {
         if off.abs() > 1e-3 && score.abs() > worst.0 {
             worst = (score.abs(), line.clone());
         }
-        if !(off.abs() < 1e-3 || score.abs() < bound) {
+        if fails(&mean) {
             failed.push(line);
         }
     }
