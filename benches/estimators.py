@@ -132,11 +132,13 @@ class Measurement:
         return self
 
     def gain(self, estimator):
-        """Efficiency over that of the walk, and its range over the repeats.
+        """Efficiency over that of the walk, and its range over the repeats; None without noise.
 
         Times are summed over the repeats, as they differ by what else the machine does alone."""
         seconds = {e: sum(s for _, s in self.work[e]) for e in ("walk", estimator)}
         variance = {e: [v for v, _ in self.work[e]] for e in ("walk", estimator)}
+        if not any(variance["walk"] + variance[estimator]):
+            return None
         ratios = sorted(w * seconds["walk"] / max(v * seconds[estimator], 1e-30)
                         for w, v in zip(variance["walk"], variance[estimator]))
         mean = (statistics.mean(variance["walk"]) * seconds["walk"]
@@ -146,6 +148,8 @@ class Measurement:
 
 def cell(gain):
     """For the table."""
+    if gain is None:
+        return "no noise"
     mean, low, high = gain
     return f"{mean:.2f} ({low:.2f}–{high:.2f})"
 
@@ -195,7 +199,7 @@ def elsewhere(args, folder):
                 scene = write_scene(folder, material_text(template, alpha), 0.5, lights)
                 measured = Measurement(args, folder, ["walk", "two-walk", "auto"]).take(scene, spp, "mse")
                 lines.append(f"| {name} | {alpha} | {what} | {cell(measured.gain('auto'))} "
-                             f"| {measured.gain('two-walk')[0]:.2f} |")
+                             f"| {cell(measured.gain('two-walk'))} |")
     return lines
 
 
