@@ -347,3 +347,21 @@ fn the_grid_holds_for_a_hundred_million_calls() {
     }
     found.assert_clean();
 }
+
+/// Straight up from a facet no other is in the way: the light leaves, and no
+/// later facet may turn an overflow into a value.
+#[test]
+fn a_walk_straight_up_leaves() {
+    let mut found = Findings::default();
+    Question {
+        wi: Vector3::new(0.955_336, 0.295_520_07, 0.001_f32),
+        wo: Vector3::new(0.0, 0.0, 1.0),
+        first: &[0.0; 12],
+        seed: 1,
+        numbers: |u| u,
+        smooth: true,
+        short: false,
+    }
+    .ask_all("GGX 1 1", Ggx::isotropic(1.0), &mut found);
+    found.assert_clean();
+}
