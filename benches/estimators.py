@@ -20,11 +20,11 @@ import math
 import os
 import re
 import statistics
-import subprocess
 import sys
 import tempfile
 
 import section
+from command import run
 
 ROOT = section.ROOT
 PAGE = os.path.join(ROOT, "docs", "estimators.md")
@@ -52,14 +52,6 @@ FAR = 1000  # metres to the lamp: across the square nothing changes
 SCENES = ("brushed_metal", "furnace", "gallery", "gold_sphere", "interior", "rough_glass", "sphere_rows", "suzanne")
 # A share of the samples that a scene has by itself, so that all take about as long.
 SCENE_SPP = {"furnace": 16, "sphere_rows": 4, "suzanne": 2}
-
-
-def run(command):
-    """Run to the end; its standard output. Leaves with what it said when it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def lamp(side, alpha, cosine, half_angle):

@@ -14,11 +14,12 @@ import os
 import platform
 import re
 import statistics
-import subprocess
 import sys
 import tempfile
 
 from PIL import Image
+
+from command import run
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 SCENE = os.path.join(ROOT, "scenes", "gallery", "scene.yaml")
@@ -42,14 +43,6 @@ PICTURES = (
 ESTIMATORS = ("single", "auto")
 # What is timed: with branches, noisier pixels would get more paths.
 PLAIN_PATHS = ("-D", "sampling.branches=1")
-
-
-def run(command):
-    """Run to the end; its standard output. Leaves with what it said when it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def render(args, material, estimator, spp, seed, *outputs, options=()):

@@ -19,11 +19,11 @@ import json
 import os
 import re
 import statistics
-import subprocess
 import sys
 import tempfile
 
 import section
+from command import run
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 
@@ -56,14 +56,6 @@ FEATURES = (
     ("textures", "gallery", None, f"materials.figure={GOLD}"),
     ("environment map", "gallery", None, "world={constant: {color: 0.5}}"),
 )
-
-
-def run(command):
-    """Run to the end; its standard output. Leaves with what it said when it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def scene_file(name):

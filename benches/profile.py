@@ -18,8 +18,9 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
+
+from command import run
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 SCENES = ("gold_sphere", "interior", "rough_glass", "brushed_metal")
@@ -38,14 +39,6 @@ PARTS = (
     ("copying memory (libc)", ("libc.so", "libc-")),
 )
 REST = "the rest"
-
-
-def run(command):
-    """Standard output of a command; leaves with what it said when it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def samples(data):

@@ -100,11 +100,7 @@ fn rendered(scene: &Scene, resolution: [u32; 2], seed: u64) -> Result<RenderRepo
         camera,
         filter: &PixelFilter::box_filter(),
         seed,
-        limits: Limits {
-            spp: SPP,
-            time: None,
-            noise: None,
-        },
+        limits: Limits::samples(SPP),
         all_in: false,
         interrupt: &AtomicBool::new(false),
     };

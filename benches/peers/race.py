@@ -35,15 +35,7 @@ SCENES = ("gold_sphere", "interior", "rough_glass", "brushed_metal")
 
 sys.path.insert(0, os.path.dirname(HERE))
 import section  # noqa: E402
-
-
-def run(command, **environment):
-    """Run to the end; its standard output. Leaves with what it said when it fails."""
-    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True,
-                          text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)}\nfailed:\n{done.stdout}{done.stderr}")
-    return done.stdout
+from command import run  # noqa: E402
 
 
 class Worker:

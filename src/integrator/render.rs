@@ -23,6 +23,18 @@ pub struct Limits {
     pub noise: Option<f64>,
 }
 
+impl Limits {
+    /// So many samples per pixel, however long they take.
+    #[must_use]
+    pub fn samples(spp: u32) -> Self {
+        Self {
+            spp,
+            time: None,
+            noise: None,
+        }
+    }
+}
+
 /// Why rendering ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {

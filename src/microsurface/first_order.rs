@@ -96,15 +96,13 @@ impl<N, I> Microsurface<N, I> {
     /// (1 + Λ_i)/(1 + Λ_i + Λ_o). Transmission, where the depth is that of the
     /// other side (Heitz et al. 2016, § 5.2): (1 + Λ_i) B(1 + Λ_i, 1 + Λ_o).
     #[inline]
-    pub(super) fn escape<F: Real>(&self, at: At<F>, wo: Vector3<F>) -> F
+    fn escape<F: Real>(&self, at: At<F>, wo: Vector3<F>) -> F
     where
         N: Ndf<F>,
     {
         let cos_i = at.w.z;
         if wo.z > F::zero() {
-            // Multiplied through by both cosines, so that neither divides.
-            let entry = at.sigma * wo.z;
-            return entry / (entry + cos_i * self.ndf.projected_area(-wo));
+            return escape_reflected(at, wo.z, self.ndf.projected_area(-wo));
         }
         let (rate_in, rate_out) = (at.sigma / cos_i, self.ndf.projected_area(-wo) / -wo.z);
         let chance = rate_in * ln_beta(rate_in.max(F::one()), rate_out.max(F::one())).exp();
@@ -114,4 +112,13 @@ impl<N, I> Microsurface<N, I> {
             F::zero()
         }
     }
+}
+
+/// The chance that light from `at.w` leaves by reflection towards ω_o after its
+/// first interaction, given cosθ_o and σ(−ω_o).
+#[inline]
+pub(super) fn escape_reflected<F: Real>(at: At<F>, cos_o: F, sigma_back: F) -> F {
+    // Multiplied through by both cosines, so that neither divides.
+    let entry = at.sigma * cos_o;
+    entry / (entry + at.w.z * sigma_back)
 }

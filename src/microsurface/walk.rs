@@ -1,5 +1,6 @@
 //! The walk among the micro-facets.
 
+use super::first_order::escape_reflected;
 use super::{
     At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3, enters,
 };
@@ -186,10 +187,10 @@ impl<N, I> Microsurface<N, I> {
             let d = bounce.direction;
             if !known && !bounce.crosses && d.z > F::zero() {
                 ray.direction = d;
-                if rng.draw() < self.escape(entrance, d) {
+                at = self.entrance(-d);
+                if rng.draw() < escape_reflected(entrance, d.z, at.sigma) {
                     break;
                 }
-                at = self.entrance(-d);
                 if !Roulette::OF_LIGHT.survives(&mut weight, F::one(), order, rng) {
                     return None;
                 }

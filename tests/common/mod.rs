@@ -57,11 +57,7 @@ pub fn film(description: &Description, scene: &Scene, settings: Settings, aovs: 
         camera: scene.camera.as_ref().expect("the scene has a camera"),
         filter: &filter,
         seed: settings.seed,
-        limits: Limits {
-            spp: settings.spp,
-            time: None,
-            noise: None,
-        },
+        limits: Limits::samples(settings.spp),
         all_in: settings.all_in,
         interrupt: &AtomicBool::new(false),
     };

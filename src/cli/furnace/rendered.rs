@@ -71,11 +71,7 @@ pub fn render_furnace(
         camera,
         filter: &PixelFilter::box_filter(),
         seed,
-        limits: Limits {
-            spp,
-            time: None,
-            noise: None,
-        },
+        limits: Limits::samples(spp),
         all_in: false,
         interrupt: &AtomicBool::new(false),
     };

@@ -42,11 +42,7 @@ impl View<'_> {
             camera: self.camera,
             filter: self.filter,
             seed,
-            limits: Limits {
-                spp,
-                time: None,
-                noise: None,
-            },
+            limits: Limits::samples(spp),
             all_in: false,
             interrupt: &AtomicBool::new(false),
         };
