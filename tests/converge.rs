@@ -55,11 +55,12 @@ impl Drop for Folder {
     }
 }
 
-/// The film's estimate comes from the spread of the samples as if they were
-/// independent; they are stratified, so the true error may only be smaller, by
-/// about a tenth here. Below, the bound allows for chance: 3072 channels of
-/// kurtosis below 30 put the standard error of the true relMSE at a tenth at
-/// most, hence of the error itself at 0.05.
+/// The film's estimate misses what the halves of the samples gain together, and so
+/// errs on the large side: by nothing for independent samples, by √(2^1.5 − 1) = 1.35
+/// where most of the noise comes from jumps in two dimensions, as here from the outline
+/// of the sphere. Around that the bounds allow for chance: 3072 channels of kurtosis
+/// below 30 put the standard error of the true relMSE at a tenth at most, hence of the
+/// error itself at 0.05; three of those.
 #[test]
 fn the_noise_estimate_agrees_with_the_true_error() {
     let scene = small_scene();
@@ -74,7 +75,7 @@ fn the_noise_estimate_agrees_with_the_true_error() {
             let ratio = estimated / actual;
             println!("{spp} spp: estimated {estimated:.5}, true {actual:.5}, ratio {ratio:.3}");
             assert!(
-                (0.85..1.3).contains(&ratio),
+                (0.85..1.55).contains(&ratio),
                 "{spp} spp: {estimated} for {actual}"
             );
         }

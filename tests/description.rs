@@ -119,7 +119,7 @@ fn what_is_left_out_has_the_documented_default() {
             seed: 0,
             max_bounces: 12,
             roulette_start: 8,
-            branches: 4,
+            branches: None,
             estimator: auto
         }
     );

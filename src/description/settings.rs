@@ -94,8 +94,9 @@ pub struct Sampling {
     /// The first bounce at which Russian roulette may end a path.
     pub roulette_start: u32,
     /// Into how many branches a path splits at its first surface, on average
-    /// over the image: more where it is noisy. 1 is plain path tracing.
-    pub branches: u32,
+    /// over the image: more where it is noisy. 1 is plain path tracing; `None`
+    /// leaves it to what a branch costs.
+    pub branches: Option<u32>,
     /// How multiple scattering is estimated.
     pub estimator: Estimator,
 }
@@ -113,7 +114,7 @@ impl Default for Sampling {
             seed: 0,
             max_bounces: 12,
             roulette_start: 8,
-            branches: 4,
+            branches: None,
             estimator: Estimator::Auto,
         }
     }

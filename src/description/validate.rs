@@ -351,8 +351,8 @@ impl Check<'_> {
                 "expected at least 1 sample per pixel, found 0".to_owned(),
             );
         }
-        if !(1..=Sampling::MOST_BRANCHES).contains(&sampling.branches) {
-            let (most, found) = (Sampling::MOST_BRANCHES, sampling.branches);
+        let most = Sampling::MOST_BRANCHES;
+        if let Some(found) = sampling.branches.filter(|b| !(1..=most).contains(b)) {
             self.report(
                 at.key("branches"),
                 format!("expected 1 to {most} branches per path, found {found}"),

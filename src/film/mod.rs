@@ -10,12 +10,12 @@
 //! [`Film::develop`] turns sums into an [`Image`], which [`OutputPath`] writes
 //! as EXR or PNG and [`read_exr`] reads back.
 
-mod branches;
 mod exr;
 mod filter;
 mod image;
 mod noise;
 mod output;
+mod plan;
 mod resume;
 mod tile;
 
@@ -23,6 +23,7 @@ pub use exr::{ExrError, read_exr};
 pub use filter::PixelFilter;
 pub use image::{Image, Layer};
 pub use output::{OutputError, OutputPath};
+pub use plan::{Draws, Spread};
 pub use resume::{ResumeError, sidecar_path};
 pub use tile::{Fault, FaultCount, FilmTile, Sample};
 

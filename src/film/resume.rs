@@ -2,17 +2,18 @@
 //!
 //! Layout, all little-endian: the magic bytes and the version; the fingerprint
 //! of what is rendered (u64); resolution and window (6 × u32); the AOVs' bits
-//! (u8); then per tile its colour sums (per pixel 6 × f64, 6 × f32, 3 × u32),
+//! (u8); then per tile its colour sums (per pixel 6 × f64, 6 × f32, 4 × u32),
 //! its AOV sums (f64), and its faults (per cause a u64 count, a u32 number of
 //! pixels and 2 × u32 each); last a checksum of all that (u64).
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::plan::Draws;
 use super::tile::{FAULT_PIXELS, Fault};
 use super::{AovSet, Film, OutputError, Window, output};
 
-const MAGIC: &[u8; 16] = b"smithwalk film\0\x03";
+const MAGIC: &[u8; 16] = b"smithwalk film\0\x04";
 
 /// Why a saved film can't be taken up again.
 #[derive(Debug, thiserror::Error)]
@@ -80,7 +81,11 @@ impl Film {
                 for value in color.milestone.iter().chain(&color.moved) {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
-                for value in [color.count, color.left_out, color.branches] {
+                let Draws {
+                    light_samples,
+                    branches,
+                } = color.draws;
+                for value in [color.count, color.left_out, light_samples, branches] {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
             }
@@ -196,7 +201,10 @@ impl Reader<'_> {
                 }
                 color.count = self.u32()?;
                 color.left_out = self.u32()?;
-                color.branches = self.u32()?;
+                color.draws = Draws {
+                    light_samples: self.u32()?,
+                    branches: self.u32()?,
+                };
             }
             for value in &mut tile.sums {
                 *value = self.f64()?;

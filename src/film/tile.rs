@@ -1,7 +1,7 @@
 //! The accumulators of a tile of pixels.
 
+use super::plan::{Draws, Pilot, Spread};
 use super::{Aov, AovSet, Window};
-use crate::metrics::REL_EPSILON;
 
 /// Pixel positions that are remembered per cause of a fault.
 pub(super) const FAULT_PIXELS: usize = 8;
@@ -127,8 +127,8 @@ pub(super) struct ColorSum {
     pub count: u32,
     /// Samples left out for a [`Fault`] of their colour.
     pub left_out: u32,
-    /// See [`FilmTile::branches`].
-    pub branches: u32,
+    /// See [`FilmTile::draws`].
+    pub draws: Draws,
 }
 
 /// A rectangle of pixels and their accumulators, in f64.
@@ -146,6 +146,8 @@ pub struct FilmTile {
     stride: usize,
     /// In the order of [`Fault::ALL`].
     pub(super) faults: [FaultCount; 4],
+    /// Per pixel, what [`super::Film::plan`] goes by; empty when there is none.
+    pub(super) pilots: Vec<Pilot>,
 }
 
 impl FilmTile {
@@ -164,6 +166,7 @@ impl FilmTile {
             offsets,
             stride,
             faults: Fault::ALL.map(FaultCount::new),
+            pilots: Vec::new(),
         }
     }
 
@@ -173,14 +176,14 @@ impl FilmTile {
     }
 
     /// Adds a sample of `pixel` (column, row of the full image), or counts it
-    /// as a [`Fault`].
-    pub fn add(&mut self, pixel: [u32; 2], sample: &Sample) {
+    /// as a [`Fault`]; false when its colour was left out for that.
+    pub fn add(&mut self, pixel: [u32; 2], sample: &Sample) -> bool {
         let index = self.window.index(pixel);
         let color = &mut self.colors[index];
         if let Some(fault) = Fault::of_color(sample.color) {
             color.left_out += 1;
             self.faults[fault as usize].add(pixel);
-            return;
+            return false;
         }
         color.count += 1;
         for (channel, value) in sample.color.into_iter().enumerate() {
@@ -198,6 +201,7 @@ impl FilmTile {
         if self.stride > 0 {
             self.add_aovs(pixel, index, sample);
         }
+        true
     }
 
     fn add_aovs(&mut self, pixel: [u32; 2], index: usize, sample: &Sample) {
@@ -265,23 +269,33 @@ impl FilmTile {
         })
     }
 
-    /// The mean over the channels of the variance of one sample, over the squared
-    /// mean with an ε as in [`crate::metrics`].
-    pub(super) fn relative_variance(&self, pixel: [u32; 2]) -> f64 {
-        let samples = f64::from(self.samples(pixel));
-        let terms = self.color(pixel).into_iter().zip(self.variance(pixel));
-        let relative = terms.map(|(mean, v)| v * samples / (mean * mean + REL_EPSILON));
-        relative.sum::<f64>() / 3.0
+    /// How the paths of `pixel` split; none at all as long as
+    /// [`super::Film::plan`] has not decided.
+    pub fn draws(&self, pixel: [u32; 2]) -> Draws {
+        self.colors[self.window.index(pixel)].draws
     }
 
-    /// Into how many branches the paths of `pixel` split; 0 as long as
-    /// [`super::Film::plan_branches`] has not decided.
-    pub fn branches(&self, pixel: [u32; 2]) -> u32 {
-        self.colors[self.window.index(pixel)].branches
+    pub(super) fn set_draws(&mut self, pixel: [u32; 2], draws: Draws) {
+        self.colors[self.window.index(pixel)].draws = draws;
     }
 
-    pub(super) fn set_branches(&mut self, pixel: [u32; 2], branches: u32) {
-        self.colors[self.window.index(pixel)].branches = branches;
+    /// Takes note of how the parts of a sample of `pixel` differ.
+    pub fn add_pilot(&mut self, pixel: [u32; 2], light_samples: Spread, branches: Spread) {
+        self.pilots.resize(self.window.area(), Pilot::default());
+        let pilot = &mut self.pilots[self.window.index(pixel)];
+        pilot.light_samples += light_samples;
+        pilot.branches += branches;
+    }
+
+    /// Forgets the samples of `pixel`; faults found in them stay counted.
+    pub fn clear(&mut self, pixel: [u32; 2]) {
+        let index = self.window.index(pixel);
+        let draws = self.colors[index].draws;
+        self.colors[index] = ColorSum {
+            draws,
+            ..ColorSum::default()
+        };
+        self.sums[index * self.stride..][..self.stride].fill(0.0);
     }
 
     /// An estimate of the variance of [`Self::color`] that is far too uncertain

@@ -8,7 +8,7 @@ use glam::Vec3;
 use crate::bsdf::{ByOrder, Layers};
 use crate::color::Rgb;
 use crate::embree::Ray;
-use crate::film::Sample;
+use crate::film::{Sample, Spread};
 use crate::light::{EmitterId, LightSample};
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Features, Scene, Surface, has};
@@ -33,6 +33,10 @@ pub struct PathResult {
     pub first: Option<FirstHit>,
     /// Rays traced, shadow rays among them.
     pub rays: u32,
+    /// How the light samples at the first surface that scatters differ.
+    pub light_samples: Spread,
+    /// How the branches behind it differ.
+    pub branches: Spread,
 }
 
 /// What AOVs say about the first surface.
@@ -148,6 +152,8 @@ pub struct PathTracer<'a, const F: u32> {
     scene: &'a Scene,
     /// Whether the first hit's AOVs are wanted.
     describe_first: bool,
+    /// Whether it is to be told how the draws at the first surface differ.
+    pilot: bool,
 }
 
 impl<'a, const F: u32> PathTracer<'a, F> {
@@ -156,7 +162,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     /// # Panics
     /// When they are not.
     #[must_use]
-    pub fn new(scene: &'a Scene, describe_first: bool) -> Self {
+    pub fn new(scene: &'a Scene, describe_first: bool, pilot: bool) -> Self {
         assert!(
             Features::from_bits(F).contains(scene.features),
             "the kernel lacks a feature"
@@ -164,6 +170,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         Self {
             scene,
             describe_first,
+            pilot,
         }
     }
 
@@ -178,11 +185,18 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         };
         let layers = self.scene.layers::<F>(&surface);
         if has::<F>(Features::LIGHT_SAMPLING) {
-            result += mean(split.light_samples, sampler, |sampler, result| {
-                self.connect(&trunk, &surface, &layers, sampler, result);
-            });
+            let (light, spread) = mean(
+                split.light_samples,
+                self.pilot,
+                sampler,
+                |sampler, result| {
+                    self.connect(&trunk, &surface, &layers, sampler, result);
+                },
+            );
+            result += light;
+            result.light_samples = spread;
         }
-        result += mean(split.branches, sampler, |sampler, result| {
+        let (light, spread) = mean(split.branches, self.pilot, sampler, |sampler, result| {
             let mut path = trunk.clone();
             let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             while goes_on {
@@ -194,6 +208,8 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             }
         });
+        result += light;
+        result.branches = spread;
         result
     }
 
@@ -442,20 +458,35 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     }
 }
 
-/// The mean of what `trace` finds for these indices of `sampler`; rays add up.
+/// The mean of what `trace` finds for these indices of `sampler`, and how that
+/// differs; rays add up.
 fn mean(
     indices: Range<u32>,
+    measured: bool,
     sampler: &mut Sampler,
     mut trace: impl FnMut(&mut Sampler, &mut PathResult),
-) -> PathResult {
-    let share = 1.0 / indices.len() as f32;
+) -> (PathResult, Spread) {
+    let count = indices.len();
     let mut sum = PathResult::default();
+    let mut squares = [0.0; 3];
     for index in indices {
         sampler.set_index(index);
+        let before = sum.radiance.total();
         trace(sampler, &mut sum);
+        if measured {
+            let found = (sum.radiance.total() - before).to_array();
+            for (sum, found) in squares.iter_mut().zip(found) {
+                *sum += f64::from(found).powi(2);
+            }
+        }
     }
-    sum.radiance = sum.radiance * Rgb::splat(share);
-    sum
+    let spread = if measured {
+        Spread::of(count, sum.radiance.total().to_array(), squares, sum.rays)
+    } else {
+        Spread::default()
+    };
+    sum.radiance = sum.radiance * Rgb::splat(1.0 / count as f32);
+    (sum, spread)
 }
 
 impl Vertex {

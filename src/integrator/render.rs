@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::kernel::pass_for;
 use super::path::{PathTracer, Split};
 use crate::camera::Camera;
-use crate::film::{Aov, Film, FilmTile, PixelFilter};
+use crate::film::{Aov, Draws, Film, FilmTile, PixelFilter};
 use crate::sampler::{Dimension, Sampler};
 use crate::scene::{Features, Scene, has};
 
@@ -81,9 +81,15 @@ pub struct RenderReport {
 /// The least samples per pixel before an error estimate is believed.
 const MIN_SPP_FOR_NOISE: u32 = 16;
 
-/// Samples per pixel with equally many branches everywhere, from which their
-/// further allocation is decided.
+/// Samples per pixel with equally many branches everywhere, by which those of
+/// the others are decided.
 const PILOT_SAMPLES: u32 = 4;
+
+/// How those split: often enough to tell how much that matters.
+const PILOT: Draws = Draws {
+    light_samples: 2,
+    branches: 4,
+};
 
 /// Between two looks at the clock, at most this share of the time limit.
 const TIME_SLICE: f64 = 0.05;
@@ -94,36 +100,43 @@ pub(super) struct Job<'a> {
     /// Samples `first .. first + count` of every pixel.
     first: u32,
     count: u32,
+    /// Whether the film takes note of how samples differ within themselves.
+    pilot: bool,
     describe_first: bool,
 }
 
 impl Job<'_> {
-    /// How sample number `index` of a pixel splits that has been given `planned`
-    /// branches after its pilot samples.
-    fn split(&self, planned: u32, index: u32) -> Split {
-        let mean = self.request.scene.branches;
-        let piloted = index.min(PILOT_SAMPLES);
-        // Numbered on through the samples of the pixel.
+    /// How sample number `index` of a pixel splits, given what was planned for it.
+    /// The draws of a pixel are numbered on through its samples.
+    fn split(&self, planned: Draws, index: u32) -> Split {
+        // Plain paths need no plan.
+        let pilot = match self.request.scene.branches {
+            Some(1) => Draws::ONE,
+            _ => PILOT,
+        };
+        let piloted = if planned == Draws::UNPLANNED {
+            u32::MAX
+        } else if exceeds_pilot(planned) {
+            0
+        } else {
+            PILOT_SAMPLES
+        };
         let numbers = |pilot: u32, planned: u32| {
-            let first = piloted * pilot + (index - piloted) * planned;
-            let count = if index < PILOT_SAMPLES {
-                pilot
-            } else {
-                planned
-            };
+            let first = index.min(piloted) * pilot + index.saturating_sub(piloted) * planned;
+            let count = if index < piloted { pilot } else { planned };
             first..first + count
         };
         Split {
-            branches: numbers(mean, planned),
-            light_samples: numbers(light_samples(mean), light_samples(planned)),
+            light_samples: numbers(pilot.light_samples, planned.light_samples),
+            branches: numbers(pilot.branches, planned.branches),
         }
     }
 }
 
-/// How many light samples go with so many branches: half as many, as they cost
-/// as much and bring less of the noise.
-fn light_samples(branches: u32) -> u32 {
-    branches.div_ceil(2)
+/// Whether the pilot samples of a pixel are too coarse to be averaged with the
+/// others: all samples have the same weight.
+fn exceeds_pilot(planned: Draws) -> bool {
+    planned.light_samples > PILOT.light_samples || planned.branches > PILOT.branches
 }
 
 /// What to render, and how far.
@@ -161,6 +174,10 @@ pub fn render(
     let describe_first = [Aov::Albedo, Aov::Normal, Aov::Depth]
         .into_iter()
         .any(|aov| aovs.contains(aov));
+    if (1..PILOT_SAMPLES).contains(&film.samples_per_pixel()) {
+        // What these few tell about the rest is not kept with them.
+        *film = Film::new(film.resolution(), film.window(), aovs);
+    }
     let begun = film.samples_per_pixel();
     let mut spp = begun;
     let mut rays = 0;
@@ -186,13 +203,13 @@ pub fn render(
             break;
         }
         let mut count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
-        if spp < PILOT_SAMPLES {
+        let pilot = request.scene.branches != Some(1) && spp < PILOT_SAMPLES;
+        if pilot {
             count = count.min(PILOT_SAMPLES - spp);
-        } else if spp == PILOT_SAMPLES {
-            film.plan_branches(request.scene.branches);
         }
         let job = Job {
             request,
+            pilot,
             first: spp,
             count,
             describe_first,
@@ -201,6 +218,9 @@ pub fn render(
         rays += pass(&job, film.tiles_mut());
         spp += count;
         slowest_sample = slowest_sample.max(pass_start.elapsed() / count);
+        if pilot && spp == PILOT_SAMPLES {
+            film.plan(request.scene.branches);
+        }
         if let Some(target) = limits.noise {
             noise = film.relative_error();
             if spp >= MIN_SPP_FOR_NOISE && noise.is_some_and(|n| n <= target) {
@@ -240,7 +260,7 @@ fn pass_length(done: u32, left: u32, time: Option<Duration>, sample: Duration) -
 
 /// Adds the job's samples to every tile; returns the rays traced.
 pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -> u64 {
-    let tracer = PathTracer::<F>::new(job.request.scene, job.describe_first);
+    let tracer = PathTracer::<F>::new(job.request.scene, job.describe_first, job.pilot);
     tiles
         .par_iter_mut()
         // A few tiles can cost most of a pass: none waits behind another.
@@ -248,7 +268,13 @@ pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -
         .map(|tile| {
             let mut rays = 0;
             for pixel in tile.window().pixels() {
-                for sample in job.first..job.first + job.count {
+                let planned = tile.draws(pixel);
+                let anew = job.first == PILOT_SAMPLES && exceeds_pilot(planned);
+                if anew {
+                    tile.clear(pixel);
+                }
+                let first = if anew { 0 } else { job.first };
+                for sample in first..job.first + job.count {
                     rays += u64::from(render_sample(&tracer, job, pixel, sample, tile));
                 }
             }
@@ -271,7 +297,7 @@ fn render_sample<const F: u32>(
         ..
     } = *job.request;
     let mut sampler = Sampler::new(seed, pixel, index);
-    let split = job.split(tile.branches(pixel), index);
+    let split = job.split(tile.draws(pixel), index);
     let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
     let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
     let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
@@ -283,6 +309,8 @@ fn render_sample<const F: u32>(
     // Depth counts along the view axis, not along the ray.
     let depth_scale = ray.direction.dot(camera.forward());
     let result = tracer.trace(ray, &mut sampler, split);
-    tile.add(pixel, &result.to_sample(depth_scale));
+    if tile.add(pixel, &result.to_sample(depth_scale)) && job.pilot {
+        tile.add_pilot(pixel, result.light_samples, result.branches);
+    }
     result.rays
 }

@@ -96,8 +96,9 @@ pub struct Scene {
     pub max_bounces: u32,
     /// Russian roulette starts at this bounce.
     pub roulette_start: u32,
-    /// Into how many branches a path splits at its first surface, on average.
-    pub branches: u32,
+    /// Into how many branches a path splits at its first surface, on average; see
+    /// [`crate::film::Film::plan`].
+    pub branches: Option<u32>,
 }
 
 impl Scene {
