@@ -6,7 +6,7 @@ use crate::metrics::REL_EPSILON;
 /// Rays that a sample traces on average when nobody says into how many branches
 /// paths split: so many that the camera ray they share costs next to nothing. More
 /// would leave the noise that comes with the camera ray as it is.
-const RAYS_PER_SAMPLE: f64 = 24.0;
+const RAYS_PER_SAMPLE: f64 = 32.0;
 
 /// No path splits into more than this many of each.
 const MOST: f64 = 64.0;

@@ -88,7 +88,7 @@ const PILOT_SAMPLES: u32 = 4;
 /// How those split: often enough to tell how much that matters.
 const PILOT: Draws = Draws {
     light_samples: 2,
-    branches: 4,
+    branches: 2,
 };
 
 /// Between two looks at the clock, at most this share of the time limit.

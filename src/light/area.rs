@@ -215,22 +215,29 @@ impl AreaLight {
     /// The radiance along a ray and the density with which
     /// [`AreaLight::sample`] would have found it, sr⁻¹, without the
     /// probability of choosing this light.
+    #[inline]
     pub(super) fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32)> {
         let cos = -ray.direction.dot(self.normal);
-        let local = self.local(ray.origin);
-        if cos <= 0.0 || local.z <= 0.0 {
+        if cos <= 0.0 {
             return None;
         }
-        let t = local.z / cos;
-        if !(t > ray.t_near && t < ray.t_far) {
+        let from_center = ray.origin - self.center;
+        let t = from_center.dot(self.normal) / cos;
+        if !(t > 0.0 && t > ray.t_near && t < ray.t_far) {
             return None;
         }
-        let x = local.x + t * ray.direction.dot(self.x);
-        let y = local.y + t * ray.direction.dot(self.y);
-        if !self.covers(x, y) {
+        let at = from_center + ray.direction * t;
+        if !self.covers(at.dot(self.x), at.dot(self.y)) {
             return None;
         }
+        self.found(ray.origin, t, cos)
+    }
+
+    /// The radiance at a cosine to the normal, from a point of the light at the
+    /// distance `t` from `p`, and its density.
+    fn found(&self, p: Vec3, t: f32, cos: f32) -> Option<(Rgb, f32)> {
         let radiance = self.emitted(cos);
+        let local = self.local(p);
         let window = self.window(local)?;
         let spherical = self.spherical(local, &window);
         (radiance != Rgb::ZERO).then(|| (radiance, self.pdf(spherical.as_ref(), &window, t, cos)))
@@ -246,6 +253,7 @@ impl AreaLight {
         )
     }
 
+    #[inline]
     fn covers(&self, x: f32, y: f32) -> bool {
         let (x, y) = (x / self.half[0], y / self.half[1]);
         match self.outline {

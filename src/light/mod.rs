@@ -107,6 +107,7 @@ impl Shape {
         }
     }
 
+    #[inline]
     fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32)> {
         match self {
             Self::Point(light) => light.crossed(ray),
@@ -239,6 +240,7 @@ impl Lights {
     /// ray meets before its end, and of every sun when the end is infinite.
     /// `camera` says that it is a camera ray, which does not see all lights.
     /// The ray's direction must be a unit vector.
+    #[inline]
     pub fn crossed(&self, ray: &Ray, camera: bool, mut visit: impl FnMut(Rgb, f32)) {
         for (index, light) in self.lamps.iter().enumerate() {
             if camera && !light.visible_to_camera {
