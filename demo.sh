@@ -8,5 +8,5 @@ PATH=$PATH:${HOME:-/root}/.cargo/bin
 ./setup.sh
 cargo build --release --locked
 mkdir -p out
-target/release/smithwalk render scenes/suzanne/scene.yaml --spp 16 -o out/suzanne.exr -o out/suzanne.png
+target/release/smithwalk render scenes/suzanne/scene.yaml --spp 8 -o out/suzanne.exr -o out/suzanne.png
 printf '%s\n' "$PWD/out/suzanne.png"
