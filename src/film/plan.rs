@@ -263,8 +263,10 @@ mod tests {
         film.plan(None);
         assert_eq!(draws(&mut film, [2, 8]), Draws::ONE);
         let noisy = draws(&mut film, [40, 8]);
-        // The pixels near the border get fewer.
-        assert!((24..29).contains(&noisy.branches), "{noisy:?}");
+        // The pixels near the border get fewer, and so these get more than the average.
+        let rays = RAYS_PER_SAMPLE;
+        let range = rays..1.2 * rays;
+        assert!(range.contains(&noisy.branches.into()), "{noisy:?}");
         assert_eq!(noisy.light_samples, 1);
         let edge = draws(&mut film, [23, 8]).branches;
         assert!(edge > 1 && edge < noisy.branches, "{edge}");
