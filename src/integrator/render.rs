@@ -109,10 +109,10 @@ impl Job<'_> {
     /// How sample number `index` of a pixel splits, given what was planned for it.
     /// The draws of a pixel are numbered on through its samples.
     fn split(&self, planned: Draws, index: u32) -> Split {
-        // Plain paths need no plan.
-        let pilot = match self.request.scene.branches {
-            Some(1) => Draws::ONE,
-            _ => PILOT,
+        let pilot = if splits(self.request.scene) {
+            PILOT
+        } else {
+            Draws::ONE
         };
         let piloted = if planned == Draws::UNPLANNED {
             u32::MAX
@@ -131,6 +131,11 @@ impl Job<'_> {
             branches: numbers(pilot.branches, planned.branches),
         }
     }
+}
+
+/// Whether paths split at all; plain ones need neither pilots nor a plan.
+fn splits(scene: &Scene) -> bool {
+    scene.branches != Some(1)
 }
 
 /// Whether the pilot samples of a pixel are too coarse to be averaged with the
@@ -174,7 +179,8 @@ pub fn render(
     let describe_first = [Aov::Albedo, Aov::Normal, Aov::Depth]
         .into_iter()
         .any(|aov| aovs.contains(aov));
-    if (1..PILOT_SAMPLES).contains(&film.samples_per_pixel()) {
+    let splits = splits(request.scene);
+    if splits && (1..PILOT_SAMPLES).contains(&film.samples_per_pixel()) {
         // What these few tell about the rest is not kept with them.
         *film = Film::new(film.resolution(), film.window(), aovs);
     }
@@ -203,7 +209,7 @@ pub fn render(
             break;
         }
         let mut count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
-        let pilot = request.scene.branches != Some(1) && spp < PILOT_SAMPLES;
+        let pilot = splits && spp < PILOT_SAMPLES;
         if pilot {
             count = count.min(PILOT_SAMPLES - spp);
         }
