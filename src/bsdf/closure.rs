@@ -51,7 +51,7 @@ macro_rules! each_rough {
 
 /// Below this cosine a direction counts as inside the surface: nothing is
 /// scattered from there, and 1/cosθ would overflow.
-const MIN_COS: f32 = 1e-7;
+pub(super) const MIN_COS: f32 = 1e-7;
 
 impl Closure {
     /// Whether code for the features `F` has to know this closure. Asked before
@@ -88,9 +88,8 @@ impl Closure {
         )
     }
 
-    /// Draws a direction; see the contract of [`crate::bsdf`]. The one place
-    /// that refuses degenerate samples: what comes back is a finite unit
-    /// direction with a finite, non-negative, non-zero weight.
+    /// Draws a direction; see the contract of [`crate::bsdf`]. Degenerate samples
+    /// are refused: what comes back is [usable](BsdfSample::is_usable).
     #[inline(always)]
     pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
         if wo.z.is_nan() || wo.z <= MIN_COS {
@@ -102,11 +101,7 @@ impl Closure {
             Self::Interface(interface) => interface.sample(wo, rng),
             Self::Transparent(color) => BsdfSample { wi: -wo, weight: *color, order: 1 },
         );
-        let usable = sample.wi.is_finite()
-            && sample.weight.is_finite()
-            && sample.weight.min_element() >= 0.0
-            && sample.weight.max_element() > 0.0;
-        usable.then_some(sample)
+        sample.is_usable().then_some(sample)
     }
 
     /// Adds f·|cosθ_i| or an estimate of it, sr⁻¹, to `tally`, order by order;
@@ -120,6 +115,15 @@ impl Closure {
             Self::Lambert(lambert) => tally.add(1, model::Rgb(lambert.eval(wi).to_array())),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => {}
         );
+    }
+
+    /// The closure if it can be evaluated for several directions at once.
+    #[inline(always)]
+    pub(super) fn in_lanes(&self) -> Option<&Rough<Ggx<f32>, Conductor<f32>>> {
+        match self {
+            Self::GgxConductor(rough) if rough.suits_lanes() => Some(rough),
+            _ => None,
+        }
     }
 
     /// The density that multiple importance sampling uses, sr⁻¹; zero for

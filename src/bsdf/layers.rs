@@ -2,10 +2,12 @@
 
 use arrayvec::ArrayVec;
 use glam::Vec3;
+use wide::f32x8;
 
-use super::{ByOrder, Closure, Frame};
+use super::closure::MIN_COS;
+use super::{ByOrder, Closure, Frame, Rough};
 use crate::color::Rgb;
-use crate::microsurface::{self as model, Draw, Tally};
+use crate::microsurface::{self as model, Conductor, Draw, Ggx, LANES, Tally};
 use crate::scene::{Features, has};
 
 /// The most closures that a material may flatten to.
@@ -152,6 +154,23 @@ impl<const F: u32> Layers<F> {
         }
     }
 
+    /// All there is, if it is one closure that can be evaluated for several directions
+    /// at once, for less than that many evaluations cost.
+    #[inline(always)]
+    pub fn in_lanes(&self) -> Option<InLanes<'_>> {
+        if !(has::<F>(Features::METALS) && has::<F>(Features::MULTIPLE_SCATTERING)) {
+            return None;
+        }
+        let [layer] = self.layers.as_slice() else {
+            return None;
+        };
+        Some(InLanes {
+            rough: layer.closure.in_lanes()?,
+            layer,
+            normal: self.normal,
+        })
+    }
+
     /// The density of the mix for multiple importance sampling, sr⁻¹.
     #[must_use]
     #[inline]
@@ -203,7 +222,71 @@ impl<const F: u32> Layers<F> {
     /// horizon and below the true surface's, or the other way round: such light
     /// would leak through, so it is refused both when sampling and evaluating.
     fn same_side(&self, wi: Vec3, local_z: f32) -> bool {
-        wi.dot(self.normal) * local_z > 0.0
+        same_side(self.normal, wi, local_z)
+    }
+}
+
+/// See [`Layers::same_side`].
+fn same_side(normal: Vec3, wi: Vec3, local_z: f32) -> bool {
+    wi.dot(normal) * local_z > 0.0
+}
+
+/// A closure at a hit, to be evaluated for several directions at once.
+pub struct InLanes<'a> {
+    rough: &'a Rough<Ggx<f32>, Conductor<f32>>,
+    layer: &'a Layer,
+    normal: Vec3,
+}
+
+impl InLanes<'_> {
+    /// Eight times [`Layers::sample`], each with the [`Layers::pdf`] of its direction.
+    #[must_use]
+    #[inline]
+    pub fn sample(
+        &self,
+        wo: Vec3,
+        rng: &mut impl Draw<f32x8>,
+    ) -> [Option<(ScatterSample, f32)>; LANES] {
+        let wo = self.layer.frame.to_local(wo);
+        if wo.z.is_nan() || wo.z <= MIN_COS {
+            return [None; LANES];
+        }
+        self.rough.sample_lanes(wo, rng).map(|exit| {
+            let (sample, pdf) = exit.filter(|(sample, _)| sample.is_usable())?;
+            let wi = self.layer.frame.to_world(sample.wi);
+            let lit = same_side(self.normal, wi, sample.wi.z);
+            let sample = ScatterSample {
+                wi,
+                weight: sample.weight * self.layer.share,
+                order: sample.order,
+                delta: false,
+                straight: false,
+            };
+            lit.then_some((sample, pdf))
+        })
+    }
+
+    /// Estimates of f·|cosθ_i|, sr⁻¹, as [`Layers::eval`] has them, towards each of `wi`.
+    #[must_use]
+    #[inline]
+    pub fn eval(
+        &self,
+        wo: Vec3,
+        wi: [Vec3; LANES],
+        rng: &mut impl Draw<f32x8>,
+    ) -> [ByOrder; LANES] {
+        let wo = self.layer.frame.to_local(wo);
+        if wo.z.is_nan() || wo.z <= MIN_COS {
+            return [ByOrder::ZERO; LANES];
+        }
+        let local = wi.map(|wi| {
+            let local = self.layer.frame.to_local(wi);
+            let lit = local.z > MIN_COS && same_side(self.normal, wi, local.z);
+            // No light comes from below a metal.
+            if lit { local } else { Vec3::NEG_Z }
+        });
+        let values = self.rough.eval_lanes(wo, local, rng);
+        values.map(|value| value * Rgb::splat(self.layer.share))
     }
 }
 

@@ -33,7 +33,7 @@ pub use compensation::{Albedos, MeanWeight, Normals, WhiteFacets, Width};
 pub use frame::Frame;
 pub use interface::Interface;
 pub use lambert::Lambert;
-pub use layers::{Layer, Layers, MAX_LAYERS, ScatterSample};
+pub use layers::{InLanes, Layer, Layers, MAX_LAYERS, ScatterSample};
 pub use mirror::Mirror;
 pub use rough::{Method, Rough};
 
@@ -52,6 +52,27 @@ pub struct BsdfSample {
     pub weight: Rgb,
     /// How many facets the light met: 1 is single scattering.
     pub order: u32,
+}
+
+impl BsdfSample {
+    /// Whether it is a finite direction with a finite, non-negative, non-zero weight.
+    pub(crate) fn is_usable(&self) -> bool {
+        self.wi.is_finite()
+            && self.weight.is_finite()
+            && self.weight.min_element() >= 0.0
+            && self.weight.max_element() > 0.0
+    }
+}
+
+impl From<model::Exit<f32>> for BsdfSample {
+    #[inline]
+    fn from(exit: model::Exit<f32>) -> Self {
+        Self {
+            wi: from_model(exit.direction),
+            weight: Rgb::from(exit.weight.0),
+            order: exit.order,
+        }
+    }
 }
 
 /// f·|cosθ_i| in sr⁻¹ (or light that it weighted), apart by scattering order.

@@ -1,10 +1,13 @@
 //! Rough surfaces: the Smith microsurface model behind the closure contract.
 
 use glam::Vec3;
+use wide::f32x8;
 
-use super::{Albedos, BsdfSample, MeanWeight, Width, from_model, to_model};
+use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, to_model};
 use crate::color::Rgb;
-use crate::microsurface::{self as model, Draw, Estimator, Microsurface, Tally, Vector3};
+use crate::microsurface::{
+    self as model, Conductor, Draw, Estimator, Ggx, LANES, Microsurface, Tally, Vector3,
+};
 use crate::scene::{Features, has};
 
 /// How a rough surface's scattering is computed.
@@ -78,11 +81,7 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
                 Some(exit)
             }
         }?;
-        Some(BsdfSample {
-            wi: from_model(exit.direction),
-            weight: Rgb::from(exit.weight.0),
-            order: exit.order,
-        })
+        Some(BsdfSample::from(exit))
     }
 
     /// Adds an unbiased estimate of f·|cosθ_i|, sr⁻¹, to `tally`, order by order;
@@ -180,6 +179,44 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
             Method::Multiple(_) | Method::Thinned(_) => self.surface.pdf(wo, wi),
             Method::Single | Method::Compensated(_) => self.surface.pdf_single(wo, wi),
         }
+    }
+}
+
+impl Rough<Ggx<f32>, Conductor<f32>> {
+    /// Whether [`Self::eval_lanes`] does what [`Self::eval`] would.
+    #[inline]
+    pub fn suits_lanes(&self) -> bool {
+        matches!(self.method, Method::Thinned(Estimator::PositionFree))
+            && self.surface.ndf.width() >= Ggx::<f32>::POSITION_FREE_FROM
+            && self.surface.suits_position_free()
+    }
+
+    /// Eight times [`Self::sample`], each with the [`Self::pdf`] of its direction.
+    #[inline]
+    pub fn sample_lanes(
+        &self,
+        wo: Vec3,
+        rng: &mut impl Draw<f32x8>,
+    ) -> [Option<(BsdfSample, f32)>; LANES] {
+        let exits = self.surface.sample_lanes(to_model(wo), rng);
+        exits.map(|exit| exit.map(|(exit, pdf)| (BsdfSample::from(exit), pdf)))
+    }
+
+    /// Estimates of f·|cosθ_i|, sr⁻¹, towards each of `wi`.
+    #[inline]
+    pub fn eval_lanes(
+        &self,
+        wo: Vec3,
+        wi: [Vec3; LANES],
+        rng: &mut impl Draw<f32x8>,
+    ) -> [ByOrder; LANES] {
+        let (wo, wi) = (to_model(wo), wi.map(to_model));
+        let chance = wi.map(|wi| self.chance(wo, wi));
+        let values = self.surface.eval_lanes(wo, &wi, chance, rng);
+        values.map(|value| ByOrder {
+            single: Rgb::from(value.single.0),
+            multiple: Rgb::from(value.multiple.0),
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 mod kernel;
 mod path;
 mod render;
+mod sum;
 
 pub use kernel::{KERNELS, kernel_for};
 pub use path::{FirstHit, PathResult, PathTracer, Split};

@@ -3,15 +3,19 @@
 
 use std::ops::Range;
 
+use arrayvec::ArrayVec;
 use glam::Vec3;
 
-use crate::bsdf::{ByOrder, Layers};
+use crate::bsdf::{ByOrder, InLanes, Layers, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::film::{Sample, Spread};
 use crate::light::{EmitterId, LightSample};
+use crate::microsurface::LANES;
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Features, Scene, Surface, has};
+
+use super::sum::{Sum, mean};
 
 /// Surfaces that a ray may pass straight through before it counts as stuck.
 const MAX_STRAIGHT: u32 = 256;
@@ -23,6 +27,13 @@ const SHORT_OF_EMITTER: f32 = 1.0 - 1e-4;
 /// The least probability that Russian roulette lets a path go on with: bounds
 /// the factor on what survives.
 const MIN_SURVIVAL: f32 = 0.05;
+
+/// How often a light sample is evaluated at once, at least, where that takes little
+/// longer than once.
+const EVALUATIONS: usize = 2;
+
+/// The least number of branches that are worth sampling in lanes.
+const WORTH_LANES: usize = 3;
 
 /// Light carried by one path, and what its first hit looked like.
 #[derive(Clone, Copy, Debug, Default)]
@@ -184,21 +195,37 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             return result;
         };
         let layers = self.scene.layers::<F>(&surface);
+        let lanes = layers.in_lanes();
         if has::<F>(Features::LIGHT_SAMPLING) {
-            let (light, spread) = mean(
-                split.light_samples,
-                self.pilot,
-                sampler,
-                |sampler, result| {
+            let indices = split.light_samples;
+            let (light, spread) = if let Some(lanes) = &lanes {
+                self.connect_in_lanes(indices, &trunk, &surface, &layers, lanes, sampler)
+            } else {
+                mean(indices, self.pilot, sampler, |_, sampler, result| {
                     self.connect(&trunk, &surface, &layers, sampler, result);
-                },
-            );
+                })
+            };
             result += light;
             result.light_samples = spread;
         }
-        let (light, spread) = mean(split.branches, self.pilot, sampler, |sampler, result| {
+        let first = split.branches.start;
+        let lanes = lanes.filter(|_| split.branches.len() >= WORTH_LANES);
+        let mut ahead = [None; LANES];
+        let trace = |index: u32, sampler: &mut Sampler, result: &mut PathResult| {
             let mut path = trunk.clone();
-            let mut goes_on = self.scatter(&mut path, &surface, &layers, sampler);
+            let mut goes_on = if let Some(lanes) = &lanes {
+                let lane = (index - first) as usize % LANES;
+                if lane == 0 {
+                    let mut stream =
+                        sampler.lane_stream(trunk.vertex, Purpose::Sample, |i| index + i as u32);
+                    ahead = lanes.sample(-trunk.ray.direction, &mut stream);
+                }
+                ahead[lane].is_some_and(|(sample, pdf)| {
+                    self.follow(&mut path, &surface, sampler, sample, Some(pdf))
+                })
+            } else {
+                self.scatter(&mut path, &surface, &layers, sampler)
+            };
             while goes_on {
                 let Some(surface) = self.next_surface(&mut path, result) else {
                     break;
@@ -207,7 +234,8 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 self.connect(&path, &surface, &layers, sampler, result);
                 goes_on = self.scatter(&mut path, &surface, &layers, sampler);
             }
-        });
+        };
+        let (light, spread) = mean(split.branches, self.pilot, sampler, trace);
         result += light;
         result.branches = spread;
         result
@@ -286,6 +314,50 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
     }
 
+    /// The mean of these light samples at the first surface, each of them evaluated
+    /// several times at once.
+    fn connect_in_lanes(
+        &self,
+        indices: Range<u32>,
+        path: &Path,
+        surface: &Surface,
+        layers: &Layers<F>,
+        lanes: &InLanes<'_>,
+        sampler: &mut Sampler,
+    ) -> (PathResult, Spread) {
+        let wo = -path.ray.direction;
+        let vertex = path.vertex;
+        let mut sum = Sum::new(indices.len(), self.pilot);
+        let evaluations = (LANES / indices.len().next_power_of_two()).max(EVALUATIONS);
+        let mut lit = ArrayVec::<(u32, Vec3, Rgb), { LANES / EVALUATIONS }>::new();
+        for index in indices.clone() {
+            sampler.set_index(index);
+            let rays = &mut sum.result.rays;
+            if let Some((wi, light)) = self.arriving(surface, layers, wo, vertex, sampler, rays) {
+                lit.push((index, wi, light));
+            }
+            if lit.len() * evaluations == LANES || (index + 1 == indices.end && !lit.is_empty()) {
+                // Lanes that are left over look at the last one again, for nothing.
+                let lane = |lane: usize| lit[(lane / evaluations).min(lit.len() - 1)];
+                let mut stream = sampler.lane_stream(vertex, Purpose::Light, |i| {
+                    lane(i).0 * evaluations as u32 + (i % evaluations) as u32
+                });
+                let wi = std::array::from_fn(|i| lane(i).1);
+                let values = lanes.eval(wo, wi, &mut stream);
+                for (&(_, _, light), values) in lit.iter().zip(values.chunks_exact(evaluations)) {
+                    let mut value = ByOrder::ZERO;
+                    for &evaluated in values {
+                        value += evaluated;
+                    }
+                    let share = path.throughput * light * (1.0 / evaluations as f32);
+                    sum.add(value * share);
+                }
+                lit.clear();
+            }
+        }
+        sum.mean()
+    }
+
     /// The direction in which the path goes on from a surface; false when it ends.
     fn scatter(
         &self,
@@ -305,6 +377,24 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let Some(sample) = layers.sample(wo, choice, &mut stream) else {
             return false;
         };
+        let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
+            Some(layers.pdf(wo, sample.wi))
+        } else {
+            None
+        };
+        self.follow(path, surface, sampler, sample, pdf)
+    }
+
+    /// The path goes on from a surface as `sample` says, which has this density where
+    /// light samples compete; false when it ends.
+    fn follow(
+        &self,
+        path: &mut Path,
+        surface: &Surface,
+        sampler: &mut Sampler,
+        sample: ScatterSample,
+        pdf: Option<f32>,
+    ) -> bool {
         path.throughput *= sample.weight;
         if has::<F>(Features::TRANSPARENCY) && sample.straight {
             // Goes on as if nothing had been there.
@@ -314,11 +404,6 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         path.vertex += 1;
         path.ray = surface.spawn(sample.wi);
         path.multiple |= sample.order > 1;
-        let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
-            Some(layers.pdf(wo, sample.wi))
-        } else {
-            None
-        };
         path.last = Vertex {
             position: surface.position,
             pdf,
@@ -396,27 +481,42 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         sampler: &mut Sampler,
         rays: &mut u32,
     ) -> ByOrder {
+        let Some((wi, light)) = self.arriving(surface, layers, wo, vertex, sampler, rays) else {
+            return ByOrder::ZERO;
+        };
+        let mut stream = sampler.walk_stream(vertex, Purpose::Light);
+        layers.eval(wo, wi, &mut stream) * light
+    }
+
+    /// A light sample's direction and its L/p, with its multiple-importance weight,
+    /// if it reaches the surface and that can scatter it.
+    fn arriving(
+        &self,
+        surface: &Surface,
+        layers: &Layers<F>,
+        wo: Vec3,
+        vertex: u32,
+        sampler: &mut Sampler,
+        rays: &mut u32,
+    ) -> Option<(Vec3, Rgb)> {
         let choice = sampler.get_1d(Dimension::light_choice(vertex));
         let position = sampler.get_2d(Dimension::light_position(vertex));
-        let Some(light) = self.scene.lights.sample(surface.position, choice, position) else {
-            return ByOrder::ZERO;
-        };
+        let light = self
+            .scene
+            .lights
+            .sample(surface.position, choice, position)?;
         let pdf = layers.pdf(wo, light.direction);
         if pdf <= 0.0 {
-            return ByOrder::ZERO;
+            return None;
         }
-        let Some(radiance) = self.visible(surface, &light, rays) else {
-            return ByOrder::ZERO;
-        };
+        let radiance = self.visible(surface, &light, rays)?;
         // The power heuristic's weight over the density; a delta light has no rival.
         let factor = if light.delta {
             1.0 / light.pdf
         } else {
             light.pdf / (light.pdf * light.pdf + pdf * pdf)
         };
-        let mut stream = sampler.walk_stream(vertex, Purpose::Light);
-        let value = layers.eval(wo, light.direction, &mut stream);
-        value * (radiance * factor)
+        Some((light.direction, radiance * factor))
     }
 
     /// The radiance of the light sample that reaches the surface; `None` when it
@@ -456,37 +556,6 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
         None
     }
-}
-
-/// The mean of what `trace` finds for these indices of `sampler`, and how that
-/// differs; rays add up.
-fn mean(
-    indices: Range<u32>,
-    measured: bool,
-    sampler: &mut Sampler,
-    mut trace: impl FnMut(&mut Sampler, &mut PathResult),
-) -> (PathResult, Spread) {
-    let count = indices.len();
-    let mut sum = PathResult::default();
-    let mut squares = [0.0; 3];
-    for index in indices {
-        sampler.set_index(index);
-        let before = sum.radiance.total();
-        trace(sampler, &mut sum);
-        if measured {
-            let found = (sum.radiance.total() - before).to_array();
-            for (sum, found) in squares.iter_mut().zip(found) {
-                *sum += f64::from(found).powi(2);
-            }
-        }
-    }
-    let spread = if measured {
-        Spread::of(count, sum.radiance.total().to_array(), squares, sum.rays)
-    } else {
-        Spread::default()
-    };
-    sum.radiance = sum.radiance * Rgb::splat(1.0 / count as f32);
-    (sum, spread)
 }
 
 impl Vertex {

@@ -51,6 +51,7 @@ mod facets;
 mod first_order;
 pub mod fresnel;
 pub mod heights;
+mod lanes;
 mod ndf;
 mod position_free;
 mod proxy;
@@ -66,6 +67,7 @@ mod tests;
 pub use draw::{Draw, Stream};
 pub use facets::{At, Bounce, Conductor, Dielectric, Diffuse, Facets, Phase, Side};
 pub use fresnel::ConductorFresnel;
+pub use lanes::LANES;
 pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};
 pub use real::{Real, ln_beta};
 pub use tally::{PerOrder, Split, Tally, Total};
@@ -137,11 +139,21 @@ impl<N, I> Microsurface<N, I> {
         }
         match estimator {
             Estimator::Walk => self.eval_walk(wi, wo, rng, tally),
-            Estimator::PositionFree if I::MIRRORS && self.steep_lambda() < F::of(STEEP) => {
+            Estimator::PositionFree if self.suits_position_free() => {
                 self.eval_position_free(wi, wo, rng, tally)
             }
             Estimator::TwoWalk | Estimator::PositionFree => self.eval_two_walk(wi, wo, rng, tally),
         }
+    }
+
+    /// Whether [`Estimator::PositionFree`] is itself and not a fall-back.
+    #[inline]
+    pub fn suits_position_free<F: Real>(&self) -> bool
+    where
+        N: Ndf<F>,
+        I: Facets<F>,
+    {
+        I::MIRRORS && self.steep_lambda() < F::of(STEEP)
     }
 
     /// Λ at tanθ = 2, between the axes: a one-number summary of roughness.

@@ -22,11 +22,11 @@ struct Depth<F> {
 }
 
 /// Stages that are kept without an allocation: steps down of most walks.
-const COMMON: usize = 12;
+pub(super) const COMMON: usize = 12;
 
 /// A ray that goes up stays inside with no smaller chance than this: straight
 /// up, where no facet faces it, the phase function of the next one overflows.
-const NEVER: f64 = 1e-30;
+pub(super) const NEVER: f64 = 1e-30;
 
 struct Stage<F> {
     start: F,
@@ -212,9 +212,12 @@ impl<N, I> Microsurface<N, I> {
     }
 }
 
+/// Ratios of densities that are as good as 0 and ∞.
+pub(super) const RATIOS: [f64; 2] = [1e-30, 1e30];
+
 /// Keeps a product of many factors away from 0 and ∞. Weights that are this
 /// unequal are 0 and 1.
 #[inline]
 fn bounded<F: Real>(x: F) -> F {
-    x.max(F::of(1e-30)).min(F::of(1e30))
+    x.max(F::of(RATIOS[0])).min(F::of(RATIOS[1]))
 }

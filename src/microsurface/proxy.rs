@@ -63,7 +63,7 @@ impl<N, I> Microsurface<N, I> {
     /// A cheap guess of the share of orders ≥ 2: 1 − e^{−x} with x = 3Λ/2, the
     /// exponential by its series, is near that of white GGX mirrors for α ≤ 1.
     #[inline]
-    fn multiple_share<F: Real>(&self) -> F
+    pub(super) fn multiple_share<F: Real>(&self) -> F
     where
         N: Ndf<F>,
     {

@@ -10,9 +10,9 @@ use super::{
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Roulette {
     /// Weights below this share of the first are.
-    weight: f64,
+    pub weight: f64,
     /// From this order on.
-    from: u32,
+    pub from: u32,
 }
 
 impl Roulette {
@@ -35,6 +35,13 @@ impl Roulette {
 /// the weights a finite variance, as orders are exponentially distributed.
 /// Walks get here at α ≥ 10 alone.
 const LONG: u32 = 4096;
+
+/// The chance with which a walk goes on from `order`, if it is that long.
+#[inline]
+pub(super) fn chance_of_long(order: u32) -> Option<f64> {
+    let n = f64::from(order);
+    (order >= LONG).then(|| (n / (n + 1.0)).powi(3))
+}
 
 /// Light on its way.
 pub(super) struct Ray<F> {
@@ -137,9 +144,8 @@ impl Roulette {
         if brightest < least {
             chance = brightest / least;
         }
-        if order >= LONG {
-            let n = f64::from(order);
-            chance *= F::of((n / (n + 1.0)).powi(3));
+        if let Some(long) = chance_of_long(order) {
+            chance *= F::of(long);
         }
         if chance < F::one() {
             if rng.draw() >= chance {

@@ -9,5 +9,6 @@ mod continuity;
 mod domain;
 mod faults;
 mod findings;
+mod lanes;
 mod means;
 mod precision;

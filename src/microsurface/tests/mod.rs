@@ -1,5 +1,6 @@
 //! The statements that the model must satisfy, and what they are tested with.
 
+mod lanes;
 mod model;
 mod normals;
 mod phases;

@@ -11,9 +11,15 @@
 //! The first dimensions have the best two-dimensional projections at the low
 //! sample counts of a pixel, and a path may be as long as it likes.
 
+mod lanes;
+
+pub use lanes::LaneStream;
+
 use rand::Rng;
 use rand_pcg::Pcg32;
 use sobol_burley::parts::{owen_scramble_int4_rev, owen_scramble_rev};
+
+use crate::microsurface::Draw;
 
 /// Length of the Sobol sequence as a power of two; later samples start another
 /// one, scrambled afresh.
@@ -91,6 +97,16 @@ pub enum Purpose {
     Light,
 }
 
+impl Purpose {
+    /// The numbers of its walks at vertex `bounce`.
+    const fn set(self, bounce: u32) -> u32 {
+        match self {
+            Self::Sample => Dimension::bsdf(bounce).set,
+            Self::Light => Dimension::vertex(bounce, 3, 0).set,
+        }
+    }
+}
+
 /// The random numbers of one sample of one pixel.
 ///
 /// All numbers are in [0, 1) and depend on the seed, the pixel, the sample and
@@ -164,18 +180,35 @@ impl Sampler {
     /// The stream of microsurface walks at vertex `bounce`.
     #[inline]
     pub fn walk_stream(&mut self, bounce: u32, purpose: Purpose) -> WalkStream {
-        let set = match purpose {
-            Purpose::Sample => Dimension::bsdf(bounce).set,
-            Purpose::Light => Dimension::vertex(bounce, 3, 0).set,
-        };
         WalkStream {
-            key: self.set_key(set),
+            key: self.set_key(purpose.set(bounce)),
             index: self.index,
             numbers: [0.0; 4],
             left: 0,
             sets: 0,
             tail: None,
         }
+    }
+
+    /// Walks of several samples at once at vertex `bounce`, those with these indices.
+    /// Their numbers are stratified among themselves and with those of other calls,
+    /// but not the ones that [`Self::walk_stream`] gives.
+    #[inline]
+    pub fn lane_stream(
+        &mut self,
+        bounce: u32,
+        purpose: Purpose,
+        indices: impl Fn(usize) -> u32,
+    ) -> LaneStream {
+        // All lanes follow one sequence: the first decides which.
+        self.set_index(indices(0));
+        let set = purpose.set(bounce);
+        let lanes = std::array::from_fn(|lane| indices(lane) & ((1 << LOG2_SEQUENCE) - 1));
+        let sets = match purpose {
+            Purpose::Sample => 2,
+            Purpose::Light => 1,
+        };
+        LaneStream::new(self.set_key(set), lanes, sets)
     }
 
     #[inline]
@@ -245,7 +278,7 @@ impl WalkStream {
     }
 }
 
-impl crate::microsurface::Draw<f32> for WalkStream {
+impl Draw<f32> for WalkStream {
     #[inline]
     fn draw(&mut self) -> f32 {
         self.next_f32()

@@ -1,0 +1,214 @@
+//! GGX and Fresnel's reflectance for one direction in each lane: the formulas of
+//! [`Ggx`] and [`crate::microsurface::fresnel`], with masks for branches.
+
+use wide::{CmpEq, CmpGe, CmpGt, f32x8};
+
+use crate::microsurface::{ConductorFresnel, Ggx, Rgb, Vector3};
+
+/// A direction in each lane.
+#[derive(Clone, Copy)]
+pub(super) struct Directions {
+    pub x: f32x8,
+    pub y: f32x8,
+    pub z: f32x8,
+}
+
+impl Directions {
+    #[inline(always)]
+    pub fn splat(v: Vector3<f32>) -> Self {
+        Self {
+            x: v.x.into(),
+            y: v.y.into(),
+            z: v.z.into(),
+        }
+    }
+
+    #[inline(always)]
+    pub fn of(v: &[Vector3<f32>; 8]) -> Self {
+        Self {
+            x: v.map(|v| v.x).into(),
+            y: v.map(|v| v.y).into(),
+            z: v.map(|v| v.z).into(),
+        }
+    }
+
+    #[inline(always)]
+    pub fn dot(self, o: Self) -> f32x8 {
+        self.x * o.x + self.y * o.y + self.z * o.z
+    }
+
+    #[inline(always)]
+    pub fn scaled(self, s: f32x8) -> Self {
+        Self {
+            x: self.x * s,
+            y: self.y * s,
+            z: self.z * s,
+        }
+    }
+
+    #[inline(always)]
+    pub fn plus(self, o: Self) -> Self {
+        Self {
+            x: self.x + o.x,
+            y: self.y + o.y,
+            z: self.z + o.z,
+        }
+    }
+
+    #[inline(always)]
+    pub fn reversed(self) -> Self {
+        self.scaled(f32x8::from(-1.0))
+    }
+
+    /// The mirror image about the unit normals `m`, and its cosine.
+    #[inline(always)]
+    pub fn mirrored(self, m: Self) -> (Self, f32x8) {
+        let cos = self.dot(m).fast_max(f32x8::ZERO);
+        let d = m.scaled(cos + cos).plus(self.reversed());
+        // As Vector3::polished.
+        let length = f32x8::from(1.5) - f32x8::from(0.5) * d.dot(d);
+        (d.scaled(length), cos)
+    }
+}
+
+/// A GGX distribution, the same in all lanes.
+pub(super) struct GgxLanes {
+    alpha_x: f32x8,
+    alpha_y: f32x8,
+    /// π α_x α_y
+    norm: f32x8,
+}
+
+impl GgxLanes {
+    #[inline]
+    pub fn new(ndf: &Ggx<f32>) -> Self {
+        Self {
+            alpha_x: ndf.alpha_x.into(),
+            alpha_y: ndf.alpha_y.into(),
+            norm: (std::f32::consts::PI * ndf.alpha_x * ndf.alpha_y).into(),
+        }
+    }
+
+    /// D of the normal along `h`, of any length; 0 below the horizon.
+    #[inline(always)]
+    pub fn density(&self, h: Directions) -> f32x8 {
+        let (x, y) = (h.x / self.alpha_x, h.y / self.alpha_y);
+        let squared = h.dot(h);
+        let ratio = squared / (x * x + y * y + h.z * h.z);
+        h.z.cmp_gt(f32x8::ZERO)
+            .blend(ratio * ratio / self.norm, f32x8::ZERO)
+    }
+
+    /// σ(w) and σ(−w).
+    #[inline(always)]
+    pub fn projected_areas(&self, w: Directions) -> [f32x8; 2] {
+        let (x, y) = (self.alpha_x * w.x, self.alpha_y * w.y);
+        let a = x * x + y * y;
+        let s = (w.z * w.z + a).sqrt();
+        let least = f32x8::HALF * a / (s + w.z.abs());
+        [
+            least + w.z.fast_max(f32x8::ZERO),
+            least + (-w.z).fast_max(f32x8::ZERO),
+        ]
+    }
+
+    /// Normals visible from `w`.
+    #[inline(always)]
+    pub fn sample_visible(&self, w: Directions, u: f32x8, v: f32x8) -> Directions {
+        let one = f32x8::ONE;
+        let w = Directions {
+            x: self.alpha_x * w.x,
+            y: self.alpha_y * w.y,
+            z: w.z,
+        };
+        let w = w.scaled(one / w.dot(w).sqrt());
+        let below = one - w.z;
+        let level = w.x * w.x + w.y * w.y;
+        let above = w.z.cmp_ge(f32x8::ZERO).blend(one + w.z, level / below);
+        let rise = (one - u) * above;
+        let sin = (u * above * (below + rise)).fast_max(f32x8::ZERO).sqrt();
+        let (sin_phi, cos_phi) = (f32x8::from(std::f32::consts::TAU) * v).sin_cos();
+        let m = Directions {
+            x: self.alpha_x * (sin * cos_phi + w.x),
+            y: self.alpha_y * (sin * sin_phi + w.y),
+            z: rise,
+        };
+        let length = m.dot(m).sqrt();
+        let level = level.sqrt();
+        let known = length.cmp_gt(f32x8::ZERO);
+        let slanted = level.cmp_gt(f32x8::ZERO);
+        // Seen from straight below, a horizontal normal.
+        let limit = [
+            slanted.blend(w.x / level, one),
+            slanted.blend(w.y / level, f32x8::ZERO),
+        ];
+        Directions {
+            x: known.blend(m.x / length, limit[0]),
+            y: known.blend(m.y / length, limit[1]),
+            z: known.blend(m.z / length, f32x8::ZERO),
+        }
+    }
+}
+
+/// The density of the phase function of mirrors from `w`, with `sigma` = σ(w),
+/// towards `o`, sr⁻¹; and |w + o|, twice the cosine at the facet.
+#[inline(always)]
+pub(super) fn phase(ndf: &GgxLanes, w: Directions, sigma: f32x8, o: Directions) -> (f32x8, f32x8) {
+    let h = w.plus(o);
+    let length = h.dot(h).sqrt();
+    let density = ndf.density(h) / (f32x8::from(4.0) * sigma);
+    let none = length.cmp_eq(f32x8::ZERO) | sigma.cmp_eq(f32x8::ZERO);
+    (none.blend(f32x8::ZERO, density), length)
+}
+
+/// The reflectance at these cosines of incidence, per channel.
+#[inline]
+pub(super) fn reflectance(fresnel: &ConductorFresnel<f32>, cos: f32x8) -> [f32x8; 3] {
+    let cos = cos.fast_min(f32x8::ONE);
+    let each = |f: &dyn Fn(usize) -> f32x8| [f(0), f(1), f(2)];
+    match fresnel {
+        ConductorFresnel::Constant(Rgb(color)) => color.map(f32x8::from),
+        ConductorFresnel::Complex { eta, k } => each(&|c| complex(cos, eta.0[c], k.0[c])),
+        ConductorFresnel::Schlick { f0 } => f0.0.map(|f0| schlick(cos, f0)),
+        ConductorFresnel::F82 { f0, f82: edge } => each(&|c| f82(cos, f0.0[c], edge.0[c])),
+    }
+}
+
+#[inline(always)]
+fn schlick(cos: f32x8, f0: f32) -> f32x8 {
+    let c = (f32x8::ONE - cos).fast_max(f32x8::ZERO);
+    let squared = c * c;
+    f32x8::from(f0) + f32x8::from(1.0 - f0) * (squared * squared * c)
+}
+
+#[inline(always)]
+fn f82(cos: f32x8, f0: f32, edge: f32) -> f32x8 {
+    let at = 1.0 / 7.0f32;
+    let dip = (crate::microsurface::fresnel::schlick(at, f0) - edge) / (at * (1.0 - at).powi(6));
+    let c = (f32x8::ONE - cos).fast_max(f32x8::ZERO);
+    let squared = c * c;
+    (schlick(cos, f0) - f32x8::from(dip) * cos * (squared * squared * squared))
+        .fast_max(f32x8::ZERO)
+        .fast_min(f32x8::ONE)
+}
+
+#[inline(always)]
+fn complex(cos: f32x8, eta: f32, k: f32) -> f32x8 {
+    let (one, zero, half) = (f32x8::ONE, f32x8::ZERO, f32x8::HALF);
+    let sin2 = ((one - cos) * (one + cos)).fast_max(zero);
+    let t = f32x8::from((eta - k) * (eta + k)) - sin2;
+    let ab = f32x8::from(eta * k);
+    let modulus = (t * t + f32x8::from(4.0) * ab * ab).sqrt();
+    // The larger of a and b by a sum, the other from their product.
+    let large = (half * (modulus + t.abs())).sqrt();
+    let small = large.cmp_gt(zero).blend(ab / large, zero);
+    let real = t.cmp_ge(zero);
+    let (a, b) = (real.blend(large, small), real.blend(small, large));
+    let ratio = |less: f32x8, more: f32x8| more.cmp_gt(zero).blend(less / more, one);
+    let bc = b * cos;
+    let (minus, plus) = (cos - a, cos + a);
+    let rs = ratio(minus * minus + b * b, plus * plus + b * b);
+    let (minus, plus) = (a * cos - sin2, a * cos + sin2);
+    let rp = rs * ratio(minus * minus + bc * bc, plus * plus + bc * bc);
+    (half * (rs + rp)).fast_min(one)
+}
