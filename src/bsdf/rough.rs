@@ -64,6 +64,9 @@ const TURN: f32 = 1.5;
 /// so that rare bright paths do not show as specks.
 const LEAST_CHANCE: f32 = 1.0 / 16.0;
 
+/// α from which GGX metals are evaluated in lanes: there, all orders always are.
+const LANES_FROM: f32 = 0.1;
+
 /// A cosine, of tanθ = 2, that light inside the microsurface can have whatever
 /// the directions outside are.
 const INSIDE: f32 = 0.447_213_6;
@@ -183,11 +186,12 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
 }
 
 impl Rough<Ggx<f32>, Conductor<f32>> {
-    /// Whether [`Self::eval_lanes`] does what [`Self::eval`] would.
+    /// Whether [`Self::eval_lanes`] is worth its time. On smoother surfaces orders above
+    /// the first are evaluated so rarely that one evaluation is enough.
     #[inline]
     pub fn suits_lanes(&self) -> bool {
         matches!(self.method, Method::Thinned(Estimator::PositionFree))
-            && self.surface.ndf.width() >= Ggx::<f32>::POSITION_FREE_FROM
+            && self.surface.ndf.width() >= LANES_FROM
             && self.surface.suits_position_free()
     }
 

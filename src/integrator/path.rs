@@ -28,11 +28,11 @@ const SHORT_OF_EMITTER: f32 = 1.0 - 1e-4;
 /// the factor on what survives.
 const MIN_SURVIVAL: f32 = 0.05;
 
-/// How often a light sample is evaluated at once, at least, where that takes little
+/// How often a light sample is evaluated at once where that takes little
 /// longer than once.
 const EVALUATIONS: usize = 2;
 
-/// The least number of branches that are worth sampling in lanes.
+/// The least number of branches or light samples that are worth lanes.
 const WORTH_LANES: usize = 3;
 
 /// Light carried by one path, and what its first hit looked like.
@@ -198,7 +198,8 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let lanes = layers.in_lanes();
         if has::<F>(Features::LIGHT_SAMPLING) {
             let indices = split.light_samples;
-            let (light, spread) = if let Some(lanes) = &lanes {
+            let at_once = lanes.as_ref().filter(|_| indices.len() >= WORTH_LANES);
+            let (light, spread) = if let Some(lanes) = at_once {
                 self.connect_in_lanes(indices, &trunk, &surface, &layers, lanes, sampler)
             } else {
                 mean(indices, self.pilot, sampler, |_, sampler, result| {
@@ -210,7 +211,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
         let first = split.branches.start;
         let lanes = lanes.filter(|_| split.branches.len() >= WORTH_LANES);
-        let mut ahead = [None; LANES];
+        let mut ahead = ArrayVec::<_, LANES>::new();
         let trace = |index: u32, sampler: &mut Sampler, result: &mut PathResult| {
             let mut path = trunk.clone();
             let mut goes_on = if let Some(lanes) = &lanes {
@@ -218,7 +219,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 if lane == 0 {
                     let mut stream =
                         sampler.lane_stream(trunk.vertex, Purpose::Sample, |i| index + i as u32);
-                    ahead = lanes.sample(-trunk.ray.direction, &mut stream);
+                    ahead = lanes.sample(-trunk.ray.direction, &mut stream).into();
                 }
                 ahead[lane].is_some_and(|(sample, pdf)| {
                     self.follow(&mut path, &surface, sampler, sample, Some(pdf))
@@ -328,7 +329,6 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let wo = -path.ray.direction;
         let vertex = path.vertex;
         let mut sum = Sum::new(indices.len(), self.pilot);
-        let evaluations = (LANES / indices.len().next_power_of_two()).max(EVALUATIONS);
         let mut lit = ArrayVec::<(u32, Vec3, Rgb), { LANES / EVALUATIONS }>::new();
         for index in indices.clone() {
             sampler.set_index(index);
@@ -336,20 +336,20 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             if let Some((wi, light)) = self.arriving(surface, layers, wo, vertex, sampler, rays) {
                 lit.push((index, wi, light));
             }
-            if lit.len() * evaluations == LANES || (index + 1 == indices.end && !lit.is_empty()) {
+            if lit.is_full() || (index + 1 == indices.end && !lit.is_empty()) {
                 // Lanes that are left over look at the last one again, for nothing.
-                let lane = |lane: usize| lit[(lane / evaluations).min(lit.len() - 1)];
+                let lane = |lane: usize| lit[(lane / EVALUATIONS).min(lit.len() - 1)];
                 let mut stream = sampler.lane_stream(vertex, Purpose::Light, |i| {
-                    lane(i).0 * evaluations as u32 + (i % evaluations) as u32
+                    lane(i).0 * EVALUATIONS as u32 + (i % EVALUATIONS) as u32
                 });
                 let wi = std::array::from_fn(|i| lane(i).1);
                 let values = lanes.eval(wo, wi, &mut stream);
-                for (&(_, _, light), values) in lit.iter().zip(values.chunks_exact(evaluations)) {
+                for (&(_, _, light), values) in lit.iter().zip(values.chunks_exact(EVALUATIONS)) {
                     let mut value = ByOrder::ZERO;
                     for &evaluated in values {
                         value += evaluated;
                     }
-                    let share = path.throughput * light * (1.0 / evaluations as f32);
+                    let share = path.throughput * light * (1.0 / EVALUATIONS as f32);
                     sum.add(value * share);
                 }
                 lit.clear();
