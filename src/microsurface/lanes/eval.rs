@@ -176,7 +176,7 @@ impl Walks<'_> {
         let mut ratio = zero;
         loop {
             // Pick the next direction.
-            let m = self.ndf.sample_visible(w, rng.draw(), rng.draw());
+            let m = self.ndf.sample_visible(w, [rng.draw(), rng.draw()]);
             let (d, cos) = w.mirrored(m);
             for (weight, tint) in weight.iter_mut().zip(reflectance(self.fresnel, cos)) {
                 *weight *= tint;

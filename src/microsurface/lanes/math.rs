@@ -114,7 +114,7 @@ impl GgxLanes {
 
     /// Normals visible from `w`.
     #[inline(always)]
-    pub fn sample_visible(&self, w: Directions, u: f32x8, v: f32x8) -> Directions {
+    pub fn sample_visible(&self, w: Directions, [u, v]: [f32x8; 2]) -> Directions {
         let one = f32x8::ONE;
         let w = Directions {
             x: self.alpha_x * w.x,

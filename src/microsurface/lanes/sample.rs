@@ -34,14 +34,13 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
         let mut direction = w;
         let mut leaving = weight;
         let mut orders = zero;
-        let lead = [rng.draw(), rng.draw(), rng.draw(), rng.draw()];
+        // The leading four numbers are stratified jointly, and so go to what tells the
+        // most: the first facet, whether light leaves there, and half of the next facet.
+        let mut facet = [rng.draw(), rng.draw()];
+        let mut u = rng.draw();
+        let mut half_of_next = rng.draw();
         loop {
-            let (a, b) = match order {
-                0 => (lead[0], lead[1]),
-                1 => (lead[3], rng.draw()),
-                _ => (rng.draw(), rng.draw()),
-            };
-            let m = ndf.sample_visible(w, a, b);
+            let m = ndf.sample_visible(w, facet);
             let (d, cos) = w.mirrored(m);
             for (weight, tint) in weight
                 .iter_mut()
@@ -52,7 +51,6 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
             order += 1;
             let [_, back] = ndf.projected_areas(d);
             let rises = d.z.cmp_gt(zero);
-            let (u, v) = (if order == 1 { lead[2] } else { rng.draw() }, rng.draw());
 
             let entry = entrance * d.z;
             let chance = entry / (entry + cos_i * back);
@@ -62,7 +60,7 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
             let free_path = |u: f32x8| -(one - u).ln();
             depth = dives.blend(free_path(u) * (cos_i / entrance), depth);
             known |= dives;
-            let climb = free_path(v) * d.z.abs();
+            let climb = free_path(rng.draw()) * d.z.abs();
             let emerges = known & rises & climb.cmp_ge(depth * back);
             let step = climb / back;
             depth = rises.blend((depth - step).fast_max(zero), depth + step);
@@ -87,6 +85,9 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
                 break;
             }
             w = d.reversed();
+            facet = [half_of_next, rng.draw()];
+            u = rng.draw();
+            half_of_next = rng.draw();
         }
         // As Microsurface::pdf has it for mirrors.
         let view = Directions::splat(wi);
