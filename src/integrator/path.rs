@@ -387,6 +387,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
 
     /// The path goes on from a surface as `sample` says, which has this density where
     /// light samples compete; false when it ends.
+    #[inline(always)]
     fn follow(
         &self,
         path: &mut Path,
