@@ -89,7 +89,8 @@ impl Closure {
     }
 
     /// Draws a direction; see the contract of [`crate::bsdf`]. Degenerate samples
-    /// are refused: what comes back is [usable](BsdfSample::is_usable).
+    /// are refused: what comes back is a finite direction with a finite, non-negative,
+    /// non-zero weight.
     #[inline(always)]
     pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32>) -> Option<BsdfSample> {
         if wo.z.is_nan() || wo.z <= MIN_COS {
