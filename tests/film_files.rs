@@ -64,7 +64,7 @@ fn expose(film: &mut Film, from: u32, to: u32) {
                     single: [u[0] * 0.5; 3],
                     multiple: [u[1] * 0.5; 3],
                 };
-                tile.add(pixel, &sample);
+                tile.add(pixel, &[sample]);
             }
         }
     }

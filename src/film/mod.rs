@@ -338,8 +338,8 @@ mod tests {
         let aovs = AovSet::from_iter([Aov::Variance, Aov::Depth]);
         let mut film = Film::new([1, 1], Window::full([1, 1]), aovs);
         let tile = &mut film.tiles_mut()[0];
-        tile.add([0, 0], &sample([1.0, 0.0, 5.0]));
-        tile.add([0, 0], &sample([3.0, 0.0, 5.0]));
+        tile.add([0, 0], &[sample([1.0, 0.0, 5.0])]);
+        tile.add([0, 0], &[sample([3.0, 0.0, 5.0])]);
         let image = film.develop();
         assert_eq!(image.color, [[2.0, 0.0, 5.0]]);
         let variance = image.layer("variance").unwrap();
@@ -360,15 +360,30 @@ mod tests {
             single: [0.75; 3],
             multiple: [0.25; 3],
         };
-        film.tiles_mut()[0].add([0, 0], &hit);
-        film.tiles_mut()[0].add([0, 0], &Sample::default());
-        let image = film.develop();
-        let layer = |name| image.layer(name).unwrap().planes.concat();
-        assert_eq!(layer("albedo"), [0.25, 0.125, 0.5]);
-        assert_eq!(layer("normal"), [0.0, -0.5, 0.0]);
-        assert_eq!(layer("depth"), [3.0]);
-        assert_eq!(layer("single"), [0.375; 3]);
-        assert_eq!(layer("multiple"), [0.125; 3]);
+        let mut one_sample = film.clone();
+        one_sample.tiles_mut()[0].add([0, 0], &[hit, Sample::default()]);
+        film.tiles_mut()[0].add([0, 0], &[hit]);
+        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
+        for film in [film, one_sample] {
+            let image = film.develop();
+            let layer = |name| image.layer(name).unwrap().planes.concat();
+            assert_eq!(image.color, [[0.5; 3]]);
+            assert_eq!(layer("albedo"), [0.25, 0.125, 0.5]);
+            assert_eq!(layer("normal"), [0.0, -0.5, 0.0]);
+            assert_eq!(layer("depth"), [3.0]);
+            assert_eq!(layer("single"), [0.375; 3]);
+            assert_eq!(layer("multiple"), [0.125; 3]);
+        }
+    }
+
+    #[test]
+    fn one_impossible_path_spoils_a_sample() {
+        let mut film = Film::new([1, 1], Window::full([1, 1]), AovSet::NONE);
+        let tile = &mut film.tiles_mut()[0];
+        assert!(!tile.add([0, 0], &[sample([3.0; 3]), sample([-1.0; 3])]));
+        assert!(tile.add([0, 0], &[sample([3.0; 3]), sample([1.0; 3])]));
+        assert_eq!(tile.fault(Fault::Negative).samples, 1);
+        assert_eq!(film.develop().color, [[2.0; 3]]);
     }
 
     #[test]
@@ -376,12 +391,12 @@ mod tests {
         let mut film = Film::new([40, 40], Window::full([40, 40]), AovSet::NONE);
         for tile in film.tiles_mut() {
             for pixel in tile.window().pixels() {
-                tile.add(pixel, &sample([2.0; 3]));
+                tile.add(pixel, &[sample([2.0; 3])]);
                 if pixel[0] == pixel[1] {
-                    tile.add(pixel, &sample([1.0, f32::NAN, -1.0]));
-                    tile.add(pixel, &sample([f32::INFINITY, 1.0, 1.0]));
-                    tile.add(pixel, &sample([0.0, -1e-9, 1.0]));
-                    tile.add(pixel, &sample([-0.0, 4.0, 4.0]));
+                    tile.add(pixel, &[sample([1.0, f32::NAN, -1.0])]);
+                    tile.add(pixel, &[sample([f32::INFINITY, 1.0, 1.0])]);
+                    tile.add(pixel, &[sample([0.0, -1e-9, 1.0])]);
+                    tile.add(pixel, &[sample([-0.0, 4.0, 4.0])]);
                 }
             }
         }
@@ -405,7 +420,7 @@ mod tests {
                 for index in 0..8 {
                     let mut sampler = crate::sampler::Sampler::new(0, pixel, index);
                     let u = sampler.get_4d(crate::sampler::Dimension::bsdf(0));
-                    tile.add(pixel, &sample([u[0], u[1] * 1e6, u[2] * 1e-6]));
+                    tile.add(pixel, &[sample([u[0], u[1] * 1e6, u[2] * 1e-6])]);
                 }
             }
         };

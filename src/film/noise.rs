@@ -59,13 +59,11 @@ mod tests {
                     let (seed, index) = if sobol { (0, index) } else { (index.into(), 0) };
                     let u = Sampler::new(seed, pixel, index).get_2d(Dimension::lens());
                     let color = [integrand(u); 3];
-                    tile.add(
-                        pixel,
-                        &Sample {
-                            color,
-                            ..Sample::default()
-                        },
-                    );
+                    let sample = Sample {
+                        color,
+                        ..Sample::default()
+                    };
+                    tile.add(pixel, &[sample]);
                 }
             }
         }
@@ -108,9 +106,9 @@ mod tests {
     fn one_sample_says_nothing() {
         let mut film = Film::new([1, 1], Window::full([1, 1]), AovSet::NONE);
         assert_eq!(film.relative_error(), None);
-        film.tiles_mut()[0].add([0, 0], &Sample::default());
+        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
         assert_eq!(film.relative_error(), None);
-        film.tiles_mut()[0].add([0, 0], &Sample::default());
+        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
         assert_eq!(film.relative_error(), Some(0.0));
     }
 }

@@ -1,6 +1,6 @@
-//! Into how many parts the paths of a pixel split, by how much that helps.
+//! Of how many parts the samples of a pixel consist, by how much that helps.
 
-use super::{Film, Window};
+use super::{Film, FilmTile, Window};
 use crate::metrics::REL_EPSILON;
 
 /// Rays that a sample traces on average when nobody says into how many branches
@@ -8,13 +8,17 @@ use crate::metrics::REL_EPSILON;
 /// would leave the noise that comes with the camera ray as it is.
 const RAYS_PER_SAMPLE: f64 = 32.0;
 
-/// No path splits into more than this many of each.
-const MOST: f64 = 64.0;
-
 /// How the numbers of draws go with what one is worth: stratified, n of them have a
 /// variance of V n^(−3/2) where the integrand jumps along a line in two dimensions,
 /// at a cost of c n, and the best n is in proportion to (V/c)^(2/5).
 const EXPONENT: f64 = 0.4;
+
+/// Camera rays that are as good as a branch: most of what changes within a pixel
+/// changes smoothly.
+const CAMERA_SHARE: f64 = 0.25;
+
+/// From so many on, camera rays are worth starting the pixel anew.
+const WORTH_MORE_CAMERA_RAYS: u32 = 3;
 
 /// Light samples that are as good as a branch: most lights look smooth from most
 /// places, so that stratified samples of them vary less than their variance says.
@@ -24,30 +28,48 @@ const LIGHT_SHARE: f64 = 0.4;
 /// of one pixel say little about its own.
 const RADIUS: usize = 6;
 
+/// The same for how a pixel's camera rays differ: outlines are narrow.
+const OUTLINE_RADIUS: usize = 1;
+
 /// Steps of the search for the scale of all numbers of draws, which converges
 /// in a few but for those that are clamped.
 const STEPS: u32 = 12;
 
-/// Into what the paths of a pixel split at the first surface that scatters them.
+/// Of what a sample of a pixel is the mean: paths from the camera, each of which
+/// splits at the first surface that scatters it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Draws {
-    /// Samples of the light that arrives there directly.
+    /// Paths that start at the camera, each somewhere else in the pixel.
+    pub camera_rays: u32,
+    /// Samples of the light that arrives directly where one of them is scattered.
     pub light_samples: u32,
-    /// Ways in which a path goes on.
+    /// Ways in which one of them goes on from there.
     pub branches: u32,
 }
 
 impl Draws {
+    /// No more than this many of each.
+    pub const MOST: u32 = 64;
+
     /// Nothing has been decided.
     pub const UNPLANNED: Self = Self {
+        camera_rays: 0,
         light_samples: 0,
         branches: 0,
     };
 
     /// A plain path.
     pub const ONE: Self = Self {
+        camera_rays: 1,
         light_samples: 1,
         branches: 1,
+    };
+
+    /// A path that splits just often enough to tell how much that matters.
+    pub const PILOT: Self = Self {
+        camera_rays: 1,
+        light_samples: 2,
+        branches: 2,
     };
 }
 
@@ -56,6 +78,8 @@ impl Draws {
 pub struct Spread {
     /// Variance of one draw, radiance squared, per channel.
     variance: [f64; 3],
+    /// The same of the mean of all of them, if they are independent.
+    of_mean: [f64; 3],
     /// Rays that it traces.
     rays: f64,
 }
@@ -75,6 +99,7 @@ impl Spread {
         });
         Self {
             variance,
+            of_mean: variance.map(|variance| variance / n),
             rays: f64::from(rays) / n,
         }
     }
@@ -82,8 +107,9 @@ impl Spread {
 
 impl std::ops::AddAssign for Spread {
     fn add_assign(&mut self, other: Self) {
-        for (sum, variance) in self.variance.iter_mut().zip(other.variance) {
-            *sum += variance;
+        for channel in 0..3 {
+            self.variance[channel] += other.variance[channel];
+            self.of_mean[channel] += other.of_mean[channel];
         }
         self.rays += other.rays;
     }
@@ -106,24 +132,34 @@ struct Part {
 }
 
 impl Part {
+    /// Of draws with this relative variance, that trace so many rays each.
+    fn new(share: f64, variance: f64, rays: f64) -> Self {
+        let worth = if rays > 0.0 {
+            share * (variance.max(0.0) / rays).powf(EXPONENT)
+        } else {
+            0.0
+        };
+        Self { rays, worth }
+    }
+
     fn draws(self, scale: f64) -> f64 {
-        (scale * self.worth).clamp(1.0, MOST).round()
+        (scale * self.worth).clamp(1.0, Draws::MOST.into()).round()
     }
 }
 
 impl Film {
-    /// Decides how the paths of each pixel split from now on: each part of them into
-    /// a number of draws that goes with V/c, V being the variance of a draw over the
-    /// square of the pixel's mean, with an ε as in [`crate::metrics`], and c the rays
-    /// it traces. Equal errors per ray make the most of them (Neyman 1934, optimal
-    /// allocation). All numbers are scaled so that a path has `branches` on average
-    /// over the pixels where they differ at all, or else so that it traces a fixed
-    /// number of rays.
+    /// Decides how the camera paths of each pixel split from now on: into a number of
+    /// light samples and of branches that goes with V/c, V being the variance of one
+    /// over the square of the pixel's mean, with an ε as in [`crate::metrics`], and c
+    /// the rays it traces. Equal errors per ray make the most of them (Neyman 1934,
+    /// optimal allocation). All numbers are scaled so that a path has `branches` on
+    /// average over the pixels where they differ at all, or else so that it traces a
+    /// fixed number of rays; returns the scale.
     ///
     /// However they are chosen, each sample's expectation is the pixel's value, so
     /// the image has no bias; what a pixel gets is decided by its neighbours'
     /// samples alone, as its own are points of one sequence and not independent.
-    pub fn plan(&mut self, branches: Option<u32>) {
+    pub fn plan(&mut self, branches: Option<u32>) -> f64 {
         let light = self.part(LIGHT_SHARE, |pilot| pilot.light_samples);
         let paths = self.part(1.0, |pilot| pilot.branches);
         let scale = match branches {
@@ -137,46 +173,95 @@ impl Film {
         };
         let window = self.window;
         for tile in &mut self.tiles {
-            tile.pilots = Vec::new();
             for pixel in tile.window().pixels() {
                 let index = window.index(pixel);
                 let draws = Draws {
+                    camera_rays: 1,
                     light_samples: light[index].draws(scale) as u32,
                     branches: paths[index].draws(scale) as u32,
                 };
                 tile.set_draws(pixel, draws);
             }
         }
+        scale
     }
 
-    /// For each pixel of the window, the part of its paths that `spread` is of;
-    /// `share` is what its draws are worth beside those of others.
-    fn part(&self, share: f64, spread: impl Fn(&Pilot) -> Spread) -> Vec<Part> {
-        let mut rays = vec![0.0; self.window.area()];
-        let mut noise = vec![0.0; self.window.area()];
-        for tile in &self.tiles {
-            for (pixel, pilot) in tile.window().pixels().zip(&tile.pilots) {
-                let index = self.window.index(pixel);
-                let spread = spread(pilot);
-                let samples = f64::from(tile.samples(pixel));
-                let terms = tile.color(pixel).into_iter().zip(spread.variance);
-                let relative = terms.map(|(mean, v)| v / (mean * mean + REL_EPSILON));
-                noise[index] = relative.sum::<f64>() / samples;
-                rays[index] = spread.rays / samples;
+    /// Decides how many camera paths a sample of each pixel consists of from now on,
+    /// in the same way and with the scale that [`Self::plan`] has found. They share
+    /// the draws that were planned for one. It takes samples that split as planned
+    /// to tell an outline from noise.
+    pub fn plan_camera_rays(&mut self, scale: f64) {
+        let camera = self.camera_rays();
+        let window = self.window;
+        for tile in &mut self.tiles {
+            tile.pilots = Vec::new();
+            for pixel in tile.window().pixels() {
+                let camera_rays = match camera[window.index(pixel)].draws(scale) as u32 {
+                    ..WORTH_MORE_CAMERA_RAYS => 1,
+                    enough => enough,
+                };
+                let draws = tile.draws(pixel);
+                let of_each = |draws: u32| ((draws + camera_rays / 2) / camera_rays).max(1);
+                let draws = Draws {
+                    camera_rays,
+                    light_samples: of_each(draws.light_samples),
+                    branches: of_each(draws.branches),
+                };
+                tile.set_draws(pixel, draws);
             }
         }
-        let rays = neighbours(self.window, &rays);
-        let noise = neighbours(self.window, &noise);
-        let parts = noise.into_iter().zip(rays).map(|(noise, rays)| Part {
-            rays,
-            worth: if rays > 0.0 {
-                share * (noise / rays).powf(EXPONENT)
-            } else {
-                0.0
-            },
-        });
-        parts.collect()
     }
+
+    /// For each pixel of the window, the part of its samples that `spread` is of;
+    /// `share` is what its draws are worth beside those of others.
+    fn part(&self, share: f64, spread: impl Fn(&Pilot) -> Spread) -> Vec<Part> {
+        let rays = self.pilots(RADIUS, |tile, pixel, pilot| {
+            spread(pilot).rays / f64::from(tile.samples(pixel))
+        });
+        let noise = self.pilots(RADIUS, |tile, pixel, pilot| {
+            relative(tile, pixel, spread(pilot).variance) / f64::from(tile.samples(pixel))
+        });
+        let parts = noise.into_iter().zip(rays);
+        parts.map(|(v, rays)| Part::new(share, v, rays)).collect()
+    }
+
+    /// The same for camera rays: theirs is how samples differ beyond what the other
+    /// parts explain.
+    fn camera_rays(&self) -> Vec<Part> {
+        let noise = self.pilots(OUTLINE_RADIUS, |tile, pixel, pilot| {
+            let samples = f64::from(tile.samples(pixel));
+            let of_mean = tile.variance(pixel);
+            let (light, paths) = (pilot.light_samples.of_mean, pilot.branches.of_mean);
+            let beyond = [0, 1, 2].map(|channel| {
+                let explained = light[channel] + paths[channel];
+                samples * of_mean[channel] - explained / samples
+            });
+            relative(tile, pixel, beyond)
+        });
+        let parts = noise.into_iter();
+        parts.map(|v| Part::new(CAMERA_SHARE, v, 1.0)).collect()
+    }
+
+    /// For each pixel of the window, the mean of `value` over the pilots round it.
+    fn pilots(
+        &self,
+        radius: usize,
+        value: impl Fn(&FilmTile, [u32; 2], &Pilot) -> f64,
+    ) -> Vec<f64> {
+        let mut values = vec![0.0; self.window.area()];
+        for tile in &self.tiles {
+            for (pixel, pilot) in tile.window().pixels().zip(&tile.pilots) {
+                values[self.window.index(pixel)] = value(tile, pixel, pilot);
+            }
+        }
+        neighbours(self.window, &values, radius)
+    }
+}
+
+/// These variances over the square of the pixel's mean, summed over the channels.
+fn relative(tile: &FilmTile, pixel: [u32; 2], variance: [f64; 3]) -> f64 {
+    let terms = tile.color(pixel).into_iter().zip(variance);
+    terms.map(|(mean, v)| v / (mean * mean + REL_EPSILON)).sum()
 }
 
 /// The scale of numbers of draws with which `spent` (given a pixel's index and the
@@ -196,11 +281,11 @@ fn scale(paths: &[Part], target: f64, spent: impl Fn(usize, f64) -> f64) -> f64 
     if scale.is_finite() { scale } else { 0.0 }
 }
 
-/// For each pixel of `window`, the mean of `values` over those round it, itself
-/// left out; 0 where there are none.
-fn neighbours(window: Window, values: &[f64]) -> Vec<f64> {
+/// For each pixel of `window`, the mean of `values` over those at most `radius` away
+/// in both directions, itself left out; 0 where there are none.
+fn neighbours(window: Window, values: &[f64], radius: usize) -> Vec<f64> {
     let (width, height) = (window.width as usize, window.height as usize);
-    let near = |at: usize, size: usize| at.saturating_sub(RADIUS)..(at + RADIUS + 1).min(size);
+    let near = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
     let mut rows = Vec::with_capacity(values.len());
     for row in values.chunks_exact(width) {
         rows.extend((0..width).map(|x| row[near(x, width)].iter().sum::<f64>()));
@@ -242,7 +327,7 @@ mod tests {
                         color,
                         ..Sample::default()
                     };
-                    assert!(tile.add(pixel, &sample));
+                    assert!(tile.add(pixel, &[sample]));
                     let light = Spread::of(2, [2.0; 3], [2.0; 3], 2);
                     tile.add_pilot(pixel, light, Spread::of(2, [2.0; 3], squares, 2 * rays));
                 }
@@ -285,6 +370,41 @@ mod tests {
             let mean = f64::from(sum) / f64::from(count);
             assert!((mean / RAYS_PER_SAMPLE - 1.0).abs() < 0.1, "{rays}: {mean}");
         }
+    }
+
+    /// Samples are 0.5 and 1.5 by turns but in the left third; branches tell why in
+    /// the right one.
+    #[test]
+    fn outlines_get_more_camera_rays_and_noise_does_not() {
+        let mut film = Film::new([48, 48], Window::full([48, 48]), AovSet::NONE);
+        for tile in film.tiles_mut() {
+            for pixel in tile.window().pixels() {
+                let third = pixel[0] / 16;
+                let squares = if third == 2 { [4.0; 3] } else { [2.0; 3] };
+                for value in [0.5, 1.5, 0.5, 1.5, 0.5] {
+                    let color = [if third == 0 { 1.0 } else { value }; 3];
+                    let sample = Sample {
+                        color,
+                        ..Sample::default()
+                    };
+                    assert!(tile.add(pixel, &[sample]));
+                    let light = Spread::of(2, [2.0; 3], [2.0; 3], 2);
+                    tile.add_pilot(pixel, light, Spread::of(2, [2.0; 3], squares, 2));
+                }
+            }
+        }
+        let scale = film.plan(None);
+        let planned = [8, 30, 40].map(|x| draws(&mut film, [x, 24]));
+        film.plan_camera_rays(scale);
+        let [flat, outline, noise] = [8, 30, 40].map(|x| draws(&mut film, [x, 24]));
+        assert_eq!([flat, noise], [planned[0], planned[2]]);
+        assert!(outline.camera_rays >= WORTH_MORE_CAMERA_RAYS, "{outline:?}");
+        let branches = outline.camera_rays * outline.branches;
+        assert!(
+            branches.abs_diff(planned[1].branches) <= outline.camera_rays / 2,
+            "{outline:?} {:?}",
+            planned[1]
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::plan::Draws;
 use super::tile::{FAULT_PIXELS, Fault};
 use super::{AovSet, Film, OutputError, Window, output};
 
-const MAGIC: &[u8; 16] = b"smithwalk film\0\x04";
+const MAGIC: &[u8; 16] = b"smithwalk film\0\x05";
 
 /// Why a saved film can't be taken up again.
 #[derive(Debug, thiserror::Error)]
@@ -82,10 +82,15 @@ impl Film {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
                 let Draws {
+                    camera_rays,
                     light_samples,
                     branches,
                 } = color.draws;
-                for value in [color.count, color.left_out, light_samples, branches] {
+                let counts = [color.count, color.left_out];
+                for value in counts
+                    .into_iter()
+                    .chain([camera_rays, light_samples, branches])
+                {
                     bytes.extend_from_slice(&value.to_le_bytes());
                 }
             }
@@ -202,6 +207,7 @@ impl Reader<'_> {
                 color.count = self.u32()?;
                 color.left_out = self.u32()?;
                 color.draws = Draws {
+                    camera_rays: self.u32()?,
                     light_samples: self.u32()?,
                     branches: self.u32()?,
                 };

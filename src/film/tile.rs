@@ -138,7 +138,7 @@ pub struct FilmTile {
     /// Per pixel, row by row.
     pub(super) colors: Vec<ColorSum>,
     /// Per pixel, and there per stored AOV: the sum of each channel, and the
-    /// number of samples in it.
+    /// number of samples in it, of which a path can be a part.
     pub(super) sums: Vec<f64>,
     /// The AOVs in `sums`, and where each begins within a pixel.
     offsets: Vec<(Aov, usize)>,
@@ -175,18 +175,28 @@ impl FilmTile {
         self.window
     }
 
-    /// Adds a sample of `pixel` (column, row of the full image), or counts it
-    /// as a [`Fault`]; false when its colour was left out for that.
-    pub fn add(&mut self, pixel: [u32; 2], sample: &Sample) -> bool {
+    /// Adds a sample of `pixel` (column, row of the full image), the mean of these
+    /// camera paths, or counts it as a [`Fault`]; false when its colour was left out
+    /// for that.
+    pub fn add(&mut self, pixel: [u32; 2], paths: &[Sample]) -> bool {
         let index = self.window.index(pixel);
+        let share = 1.0 / paths.len() as f32;
+        let mut mean = [0.0; 3];
+        for path in paths {
+            for (mean, value) in mean.iter_mut().zip(path.color) {
+                *mean += share * value;
+            }
+        }
         let color = &mut self.colors[index];
-        if let Some(fault) = Fault::of_color(sample.color) {
+        // One path can hide in the mean: black takes a negative one up.
+        let colors = paths.iter().map(|path| path.color);
+        if let Some(fault) = colors.chain([mean]).find_map(Fault::of_color) {
             color.left_out += 1;
             self.faults[fault as usize].add(pixel);
             return false;
         }
         color.count += 1;
-        for (channel, value) in sample.color.into_iter().enumerate() {
+        for (channel, value) in mean.into_iter().enumerate() {
             let value = f64::from(value);
             color.sum[channel] += value;
             color.squares[channel] += value * value;
@@ -199,25 +209,32 @@ impl FilmTile {
             }
         }
         if self.stride > 0 {
-            self.add_aovs(pixel, index, sample);
+            let mut broken = false;
+            for path in paths {
+                broken |= !self.add_aovs(index, path, f64::from(share));
+            }
+            if broken {
+                self.faults[Fault::Aov as usize].add(pixel);
+            }
         }
         true
     }
 
-    fn add_aovs(&mut self, pixel: [u32; 2], index: usize, sample: &Sample) {
+    /// Adds this share of a sample; false when one of its AOVs had to be left out.
+    fn add_aovs(&mut self, index: usize, path: &Sample, share: f64) -> bool {
         let sums = &mut self.sums[index * self.stride..][..self.stride];
         let mut broken = false;
         for &(aov, offset) in &self.offsets {
-            let depth = sample.depth.map(|depth| [depth]);
+            let depth = path.depth.map(|depth| [depth]);
             let values: &[f32] = match aov {
-                Aov::Albedo => &sample.albedo,
-                Aov::Normal => &sample.normal,
+                Aov::Albedo => &path.albedo,
+                Aov::Normal => &path.normal,
                 Aov::Depth => match &depth {
                     Some(depth) => depth,
                     None => continue,
                 },
-                Aov::Single => &sample.single,
-                Aov::Multiple => &sample.multiple,
+                Aov::Single => &path.single,
+                Aov::Multiple => &path.multiple,
                 Aov::Variance => unreachable!("the variance is not stored"),
             };
             if !values.iter().all(|value| value.is_finite()) {
@@ -225,13 +242,11 @@ impl FilmTile {
                 continue;
             }
             for (sum, &value) in sums[offset..].iter_mut().zip(values) {
-                *sum += f64::from(value);
+                *sum += share * f64::from(value);
             }
-            sums[offset + values.len()] += 1.0;
+            sums[offset + values.len()] += share;
         }
-        if broken {
-            self.faults[Fault::Aov as usize].add(pixel);
-        }
+        !broken
     }
 
     /// Number of samples of `pixel` so far, with those left out: the index of
@@ -287,7 +302,8 @@ impl FilmTile {
         pilot.branches += branches;
     }
 
-    /// Forgets the samples of `pixel`; faults found in them stay counted.
+    /// Forgets the samples of `pixel` and how they differ; faults found in them stay
+    /// counted.
     pub fn clear(&mut self, pixel: [u32; 2]) {
         let index = self.window.index(pixel);
         let draws = self.colors[index].draws;
@@ -296,6 +312,9 @@ impl FilmTile {
             ..ColorSum::default()
         };
         self.sums[index * self.stride..][..self.stride].fill(0.0);
+        if let Some(pilot) = self.pilots.get_mut(index) {
+            *pilot = Pilot::default();
+        }
     }
 
     /// An estimate of the variance of [`Self::color`] that is far too uncertain
@@ -330,7 +349,7 @@ impl FilmTile {
         }
         sums[..channels]
             .iter()
-            .map(|sum| sum / count.max(1.0))
+            .map(|sum| if count > 0.0 { sum / count } else { 0.0 })
             .collect()
     }
 

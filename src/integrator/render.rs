@@ -3,12 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
 use super::kernel::pass_for;
 use super::path::{PathTracer, Split};
 use crate::camera::Camera;
-use crate::film::{Aov, Draws, Film, FilmTile, PixelFilter};
+use crate::film::{Aov, Draws, Film, FilmTile, PixelFilter, Spread};
 use crate::sampler::{Dimension, Sampler};
 use crate::scene::{Features, Scene, has};
 
@@ -85,11 +86,8 @@ const MIN_SPP_FOR_NOISE: u32 = 16;
 /// the others are decided.
 const PILOT_SAMPLES: u32 = 4;
 
-/// How those split: often enough to tell how much that matters.
-const PILOT: Draws = Draws {
-    light_samples: 2,
-    branches: 2,
-};
+/// Samples per pixel by which the camera rays of the others are decided.
+const OUTLINE_SAMPLES: u32 = 5;
 
 /// Between two looks at the clock, at most this share of the time limit.
 const TIME_SLICE: f64 = 0.05;
@@ -106,11 +104,11 @@ pub(super) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// How sample number `index` of a pixel splits, given what was planned for it.
-    /// The draws of a pixel are numbered on through its samples.
+    /// How camera path number `index` of a pixel splits, given what was planned for it.
+    /// The draws of a pixel are numbered on through its paths.
     fn split(&self, planned: Draws, index: u32) -> Split {
         let pilot = if splits(self.request.scene) {
-            PILOT
+            Draws::PILOT
         } else {
             Draws::ONE
         };
@@ -141,7 +139,9 @@ fn splits(scene: &Scene) -> bool {
 /// Whether the pilot samples of a pixel are too coarse to be averaged with the
 /// others: all samples have the same weight.
 fn exceeds_pilot(planned: Draws) -> bool {
-    planned.light_samples > PILOT.light_samples || planned.branches > PILOT.branches
+    planned.camera_rays > Draws::PILOT.camera_rays
+        || planned.light_samples > Draws::PILOT.light_samples
+        || planned.branches > Draws::PILOT.branches
 }
 
 /// What to render, and how far.
@@ -180,7 +180,7 @@ pub fn render(
         .into_iter()
         .any(|aov| aovs.contains(aov));
     let splits = splits(request.scene);
-    if splits && (1..PILOT_SAMPLES).contains(&film.samples_per_pixel()) {
+    if splits && (1..OUTLINE_SAMPLES).contains(&film.samples_per_pixel()) {
         // What these few tell about the rest is not kept with them.
         *film = Film::new(film.resolution(), film.window(), aovs);
     }
@@ -188,6 +188,7 @@ pub fn render(
     let mut spp = begun;
     let mut rays = 0;
     let mut noise = None;
+    let mut scale = 0.0;
     let mut stop = Stop::Samples;
     let mut slowest_sample = Duration::ZERO;
     while spp < limits.spp {
@@ -209,9 +210,14 @@ pub fn render(
             break;
         }
         let mut count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
-        let pilot = splits && spp < PILOT_SAMPLES;
+        let pilot = splits && spp < OUTLINE_SAMPLES;
         if pilot {
-            count = count.min(PILOT_SAMPLES - spp);
+            let planned = if spp < PILOT_SAMPLES {
+                PILOT_SAMPLES
+            } else {
+                OUTLINE_SAMPLES
+            };
+            count = count.min(planned - spp);
         }
         let job = Job {
             request,
@@ -225,7 +231,10 @@ pub fn render(
         spp += count;
         slowest_sample = slowest_sample.max(pass_start.elapsed() / count);
         if pilot && spp == PILOT_SAMPLES {
-            film.plan(request.scene.branches);
+            scale = film.plan(request.scene.branches);
+        }
+        if pilot && spp == OUTLINE_SAMPLES {
+            film.plan_camera_rays(scale);
         }
         if let Some(target) = limits.noise {
             noise = film.relative_error();
@@ -275,7 +284,8 @@ pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -
             let mut rays = 0;
             for pixel in tile.window().pixels() {
                 let planned = tile.draws(pixel);
-                let anew = job.first == PILOT_SAMPLES && exceeds_pilot(planned);
+                let anew = job.first == PILOT_SAMPLES && exceeds_pilot(planned)
+                    || job.first == OUTLINE_SAMPLES && planned.camera_rays > 1;
                 if anew {
                     tile.clear(pixel);
                 }
@@ -289,6 +299,7 @@ pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -
         .sum()
 }
 
+/// Adds sample number `index` of a pixel; returns the rays traced.
 fn render_sample<const F: u32>(
     tracer: &PathTracer<'_, F>,
     job: &Job<'_>,
@@ -302,21 +313,32 @@ fn render_sample<const F: u32>(
         seed,
         ..
     } = *job.request;
-    let mut sampler = Sampler::new(seed, pixel, index);
-    let split = job.split(tile.draws(pixel), index);
-    let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
-    let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
-    let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
-        sampler.get_2d(Dimension::lens())
-    } else {
-        [0.5; 2]
-    };
-    let ray = camera.ray(raster, lens);
-    // Depth counts along the view axis, not along the ray.
-    let depth_scale = ray.direction.dot(camera.forward());
-    let result = tracer.trace(ray, &mut sampler, split);
-    if tile.add(pixel, &result.to_sample(depth_scale)) && job.pilot {
-        tile.add_pilot(pixel, result.light_samples, result.branches);
+    let planned = tile.draws(pixel);
+    // One before anything is planned.
+    let camera_rays = planned.camera_rays.max(1);
+    let mut paths = ArrayVec::<_, { Draws::MOST as usize }>::new();
+    let mut spreads = [Spread::default(); 2];
+    let mut rays = 0;
+    for path in index * camera_rays..(index + 1) * camera_rays {
+        let mut sampler = Sampler::new(seed, pixel, path);
+        let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
+        let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
+        let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
+            sampler.get_2d(Dimension::lens())
+        } else {
+            [0.5; 2]
+        };
+        let ray = camera.ray(raster, lens);
+        // Depth counts along the view axis, not along the ray.
+        let depth_scale = ray.direction.dot(camera.forward());
+        let result = tracer.trace(ray, &mut sampler, job.split(planned, path));
+        rays += result.rays;
+        paths.push(result.to_sample(depth_scale));
+        spreads = [result.light_samples, result.branches];
     }
-    result.rays
+    if tile.add(pixel, &paths) && job.pilot {
+        let [light_samples, branches] = spreads;
+        tile.add_pilot(pixel, light_samples, branches);
+    }
+    rays
 }
