@@ -117,6 +117,10 @@ fn json_has_the_figures() {
     close("rmse", 0.1);
     close("rel_mse", 0.01 / 1.01);
     close("rel_mse_trimmed", 0.01 / 1.01);
+    // The median over the value that 1.4826 of them make a standard deviation of.
+    close("robust_sd", 1.482_602_2 * 0.1 / 1.01_f64.sqrt());
+    close("largest_deviation", 1.0 / 1.482_602_2);
+    close("outliers", 0.0);
     assert!(number("flip") >= 0.0);
     assert!((figures["mean_a"][2].as_f64().unwrap() - 1.1).abs() < 1e-6);
     assert!((figures["mean_b"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);

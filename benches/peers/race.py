@@ -9,7 +9,9 @@ their own are the reference: the error of an image T is the mean of relMSE(T, A)
 and relMSE(T, B) less relMSE(A, B)/2, which is what the noise of A and B adds.
 Efficiency is relMSE × CPU seconds; less is better, and its ratio between two
 renderers is that of their times at equal error. relMSE is that of `smithwalk
-diff`: ε = 0.01, the worst 0.1 % of the pixels left out.
+diff`: ε = 0.01, the worst 0.1 % of the pixels left out. So are the outliers that the
+last columns have: values beyond 10 robust standard deviations of the image, against A
+or B, whichever has fewer, so that a firefly of one of them does not count.
 
 References that an earlier run left in DIR are kept, as their times do not count.
 
@@ -134,9 +136,9 @@ def contenders(args, scene):
     return able, missing
 
 
-def rel_mse(args, image, reference):
-    """As `smithwalk diff` has it, trimmed."""
-    return json.loads(run([args.smithwalk, "diff", image, reference, "--json"]))["rel_mse_trimmed"]
+def diff(args, image, reference):
+    """The figures of `smithwalk diff`."""
+    return json.loads(run([args.smithwalk, "diff", image, reference, "--json"]))
 
 
 def race(args, scene, contender):
@@ -151,12 +153,16 @@ def race(args, scene, contender):
     wanted = [job for job in references if not os.path.exists(job["out"])]
     version, times = contender.render(wanted + images, folder)
     a, b = (job["out"] for job in references)
-    floor = rel_mse(args, a, b) / 2
+    floor = diff(args, a, b)["rel_mse_trimmed"] / 2
     rows = []
     for job, time in zip(images, times[len(wanted):]):
-        error = (rel_mse(args, job["out"], a) + rel_mse(args, job["out"], b)) / 2 - floor
+        to_a, to_b = (diff(args, job["out"], reference) for reference in (a, b))
+        error = (to_a["rel_mse_trimmed"] + to_b["rel_mse_trimmed"]) / 2 - floor
+        values = 3 * to_a["width"] * to_a["height"]
         rows.append({"name": contender.name, "spp": job["spp"], "seed": job["seed"],
-                     **time, "rel_mse": error, "floor": floor})
+                     **time, "rel_mse": error, "floor": floor,
+                     "outliers_per_million": 1e6 * min(to_a["outliers"], to_b["outliers"]) / values,
+                     "largest_deviation": min(to_a["largest_deviation"], to_b["largest_deviation"])})
     return version, rows
 
 
@@ -175,15 +181,17 @@ def table(args, scene, versions, rows):
     """Markdown: figures of one scene at the last number of samples, mean over the seeds."""
     spp = args.spp[-1]
     lines = [f"### {scene}", "",
-             f"| at {spp} spp | version | wall s | CPU s | relative RMSE | relMSE × CPU s | spread |",
-             "|---|---|---|---|---|---|---|"]
+             f"| at {spp} spp | version | wall s | CPU s | relative RMSE | relMSE × CPU s | spread "
+             "| outliers per million | largest, σ |",
+             "|---|---|---|---|---|---|---|---|---|"]
     for name, version in versions.items():
-        wall, cpu, error = (mean_of(rows, name, spp, lambda row, k=key: row[k])[0]
-                            for key in ("wall_s", "cpu_s", "rel_mse"))
+        wall, cpu, error, outliers = (mean_of(rows, name, spp, lambda row, k=key: row[k])[0] for key in (
+            "wall_s", "cpu_s", "rel_mse", "outliers_per_million"))
+        largest = max(mean_of(rows, name, spp, lambda row: row["largest_deviation"])[1])
         mean, costs = mean_of(rows, name, spp, cost)
         spread = statistics.stdev(costs) / abs(mean) if len(costs) > 1 else 0.0
         lines.append(f"| {name} | {version} | {wall:.2f} | {cpu:.2f} | {max(error, 0.0) ** 0.5:.4f} "
-                     f"| {mean:.2e} | ± {100 * spread:.0f} % |")
+                     f"| {mean:.2e} | ± {100 * spread:.0f} % | {outliers:.0f} | {largest:.0f} |")
     return "\n".join(lines) + "\n\n"
 
 
@@ -231,7 +239,8 @@ def page(args, raced, missing):
             "is a random walk in Cycles 3.4 and a scaling of single scattering in 5.0. Times are of the\n"
             "render call, with the scene's hand-over in Cycles. Mitsuba's `roughconductor` takes no rotation\n"
             "of the tangent: its engine-turned steel (`brushed_metal`) is brushed along u, another picture;\n"
-            "and it counts a glass colour once, not at every facet.\n\n")
+            "and it counts a glass colour once, not at every facet. Outliers are values (three to a pixel)\n"
+            "beyond 10 robust standard deviations σ of the image's noise, see `smithwalk diff`.\n\n")
     text += factors(args, raced)
     for scene, (versions, rows) in raced.items():
         text += table(args, scene, versions, rows)

@@ -6,7 +6,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use smithwalk::film::{OutputPath, read_exr};
-use smithwalk::metrics::{Comparison, DifferenceMap, FALSE_ALARM_RATE, Pair, ZTest};
+use smithwalk::metrics::{
+    Comparison, DifferenceMap, FALSE_ALARM_RATE, OUTLIER, Outliers, Pair, ZTest,
+};
 
 /// Compare an image with its reference.
 ///
@@ -212,6 +214,18 @@ fn write_table(
     )?;
     writeln!(out, "{:<28}{:>11.4e}", "RMSE", figures.rmse)?;
     writeln!(out, "{:<28}{:>11.4}", "FLIP, 0 to 1", figures.flip)?;
+    let Outliers {
+        robust_sd,
+        largest_deviation,
+        outliers,
+    } = figures.outliers;
+    writeln!(
+        out,
+        "{:<28}{largest_deviation:>11.1} robust standard deviations of {:.3} %; {outliers} of {} values beyond {OUTLIER}",
+        "largest difference",
+        100.0 * robust_sd,
+        3 * (width * height) as usize - 3 * figures.non_finite_pixels,
+    )?;
     if let Some(z) = &figures.z {
         write_z(z, out)?;
     }

@@ -4,8 +4,8 @@ use crate::film::{Image, Window};
 
 use super::ztest::guard_variance;
 use super::{
-    DifferenceMap, Precision, ZTest, flip, mean, mse, rel_bias, rel_bias_trimmed, rel_mse,
-    rel_mse_trimmed, relative_difference_map, z_map, z_test,
+    DifferenceMap, Outliers, Precision, ZTest, flip, mean, mse, outliers, rel_bias,
+    rel_bias_trimmed, rel_mse, rel_mse_trimmed, relative_difference_map, z_map, z_test,
 };
 
 /// Why two images can't be compared.
@@ -63,6 +63,9 @@ pub struct Comparison {
     pub rel_mse: f64,
     /// See [`rel_mse_trimmed`].
     pub rel_mse_trimmed: f64,
+    /// See [`Outliers`].
+    #[serde(flatten)]
+    pub outliers: Outliers,
     /// See [`flip()`].
     pub flip: f32,
     /// Filled in when asked for.
@@ -145,6 +148,7 @@ impl Pair {
             rmse: mse.sqrt(),
             rel_mse: rel_mse(&a, &b),
             rel_mse_trimmed: rel_mse_trimmed(&a, &b),
+            outliers: outliers(&a, &b),
             flip: flip(&self.a, &self.b, exposure),
             z: None,
         })

@@ -8,11 +8,13 @@
 mod compare;
 mod flip;
 mod map;
+mod outliers;
 mod ztest;
 
 pub use compare::{CompareError, Comparison, Pair};
 pub use flip::flip;
 pub use map::{DifferenceMap, relative_difference_map, z_map};
+pub use outliers::{OUTLIER, Outliers, outliers};
 pub use ztest::{FALSE_ALARM_RATE, Precision, ZTest, z_test};
 
 /// The ε of relative errors, in squared radiance: errors of pixels darker than
