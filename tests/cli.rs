@@ -208,7 +208,13 @@ fn resume_goes_on_where_it_stopped() {
         whole.to_str().expect("UTF-8"),
     );
     let size = ["-D", "film.width=40", "-D", "film.height=40"];
-    for (spp, file) in [("5", parts), ("12", parts), ("12", whole)] {
+    let runs = [
+        ("3", parts, ""),
+        ("5", parts, "starting afresh"),
+        ("12", parts, "resuming at 5 samples"),
+        ("12", whole, ""),
+    ];
+    for (spp, file, said) in runs {
         let args = ["render", SCENE, "--resume", "--spp", spp, "-o", file];
         let output = smithwalk(&[&args[..], &size[..]].concat());
         assert!(
@@ -216,6 +222,8 @@ fn resume_goes_on_where_it_stopped() {
             "{}",
             String::from_utf8_lossy(&output.stderr)
         );
+        let log = String::from_utf8_lossy(&output.stderr);
+        assert!(log.contains(said), "{spp}: {log}");
     }
     let figures = json(&["diff", parts, whole, "--json"]);
     assert_eq!(figures["mse"].as_f64(), Some(0.0));

@@ -11,7 +11,7 @@ use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use smithwalk::description::{Aov as AovName, Description, Estimator, Filter};
 use smithwalk::film::{Aov, AovSet, Film, OutputPath, PixelFilter, Window, sidecar_path};
-use smithwalk::integrator::{Limits, Progress, RenderReport, RenderRequest, Stop, render};
+use smithwalk::integrator::{Limits, Progress, RenderReport, RenderRequest, Stop, begun, render};
 use smithwalk::scene::{Features, Scene};
 
 use super::scene::SceneArgs;
@@ -132,11 +132,10 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let sidecar = sidecar_path(outputs[0].path());
     if args.resume && sidecar.exists() {
         film.resume(&sidecar, fingerprint)?;
-        writeln!(
-            log,
-            "resuming at {} samples per pixel",
-            film.samples_per_pixel()
-        )?;
+        match begun(&scene, &film) {
+            0 => writeln!(log, "too few samples to go on from: starting afresh")?,
+            samples => writeln!(log, "resuming at {samples} samples per pixel")?,
+        }
     }
 
     let interrupt = Arc::new(AtomicBool::new(false));

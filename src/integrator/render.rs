@@ -136,6 +136,16 @@ fn splits(scene: &Scene) -> bool {
     scene.branches != Some(1)
 }
 
+/// How many of a film's samples per pixel [`render`] goes on from: all, or none when
+/// they are too few to know how paths are to split. What those tell about the others is
+/// not kept with them.
+pub fn begun(scene: &Scene, film: &Film) -> u32 {
+    match film.samples_per_pixel() {
+        ..OUTLINE_SAMPLES if splits(scene) => 0,
+        samples => samples,
+    }
+}
+
 /// Whether the pilot samples of a pixel are too coarse to be averaged with the
 /// others: all samples have the same weight.
 fn exceeds_pilot(planned: Draws) -> bool {
@@ -164,7 +174,7 @@ pub struct RenderRequest<'a> {
 }
 
 /// Renders into `film`, which may have samples already: they are counted and
-/// continued. The image depends on scene, seed and number of samples alone,
+/// continued, see [`begun`]. The image depends on scene, seed and number of samples alone,
 /// not on threads or passes. When `interrupt` becomes true the current pass is
 /// finished first, so that all pixels have equally many samples.
 pub fn render(
@@ -180,11 +190,10 @@ pub fn render(
         .into_iter()
         .any(|aov| aovs.contains(aov));
     let splits = splits(request.scene);
-    if splits && (1..OUTLINE_SAMPLES).contains(&film.samples_per_pixel()) {
-        // What these few tell about the rest is not kept with them.
+    let begun = begun(request.scene, film);
+    if begun < film.samples_per_pixel() {
         *film = Film::new(film.resolution(), film.window(), aovs);
     }
-    let begun = film.samples_per_pixel();
     let mut spp = begun;
     let mut rays = 0;
     let mut noise = None;
