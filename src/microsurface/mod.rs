@@ -67,7 +67,7 @@ mod tests;
 pub use draw::{Draw, Stream};
 pub use facets::{At, Bounce, Conductor, Dielectric, Diffuse, Facets, Phase, Side};
 pub use fresnel::ConductorFresnel;
-pub use lanes::LANES;
+pub use lanes::{LANES, NdfInLanes};
 pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};
 pub use real::{Real, ln_beta};
 pub use tally::{PerOrder, Split, Tally, Total};

@@ -6,6 +6,7 @@ use super::domain::{ALPHAS, COSINES, Metered, direction, metals};
 use super::findings::{Findings, Kind};
 use rayon::prelude::*;
 use smithwalk::microsurface::*;
+use std::fmt::Debug;
 use wide::f32x8;
 
 /// A metered stream in each lane, the first numbers of which differ.
@@ -33,8 +34,8 @@ fn near(a: f32, b: f32) -> bool {
     (a - b).abs() <= 1e-3 * a.max(b) || a.max(b) < 1e-20
 }
 
-fn ask(
-    surface: &Microsurface<Ggx<f32>, Conductor<f32>>,
+fn ask<N: NdfInLanes + Debug>(
+    surface: &Microsurface<N, Conductor<f32>>,
     wi: Vector3<f32>,
     wo: &[Vector3<f32>; LANES],
     mut rng: Eight,
@@ -90,7 +91,16 @@ fn ask(
 }
 
 #[test]
-fn lanes_hold_everywhere() {
+fn lanes_hold_everywhere_on_ggx() {
+    hold_everywhere(|(alpha_x, alpha_y)| Ggx { alpha_x, alpha_y });
+}
+
+#[test]
+fn lanes_hold_everywhere_on_beckmann() {
+    hold_everywhere(|(alpha_x, alpha_y)| Beckmann { alpha_x, alpha_y });
+}
+
+fn hold_everywhere<N: NdfInLanes + Debug>(new: impl Fn((f32, f32)) -> N + Sync) {
     let starts: &'static [Vec<f32>; 5] = Box::leak(Box::new(starts::<f32>()));
     let cases: Vec<_> = ALPHAS
         .into_iter()
@@ -99,10 +109,7 @@ fn lanes_hold_everywhere() {
     let all = cases.par_iter().enumerate().map(|(k, &(alpha, fresnel))| {
         let mut found = Findings::default();
         let surface = Microsurface {
-            ndf: Ggx {
-                alpha_x: alpha.0 as f32,
-                alpha_y: alpha.1 as f32,
-            },
+            ndf: new((alpha.0 as f32, alpha.1 as f32)),
             facets: Conductor { fresnel },
         };
         // Rougher ones are not evaluated in lanes.

@@ -3,13 +3,12 @@
 use smallvec::SmallVec;
 use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
-use super::math::{Directions, GgxLanes, phase, reflectance};
+use super::math::{Directions, phase, reflectance};
+use super::ndf::{NdfInLanes, NdfLanes};
 use super::{LANES, survivors};
 use crate::microsurface::position_free::{COMMON, NEVER, RATIOS};
 use crate::microsurface::walk::Roulette;
-use crate::microsurface::{
-    Conductor, ConductorFresnel, Draw, Ggx, Microsurface, Rgb, Split, Vector3,
-};
+use crate::microsurface::{Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Vector3};
 
 /// One stage of a [`Depth`] in each lane.
 #[derive(Clone, Copy)]
@@ -85,22 +84,22 @@ struct End {
 
 impl End {
     #[inline]
-    fn new(ndf: &GgxLanes, w: Directions) -> Self {
+    fn new(ndf: &impl NdfLanes, w: Directions) -> Self {
         let [sigma, below] = ndf.projected_areas(w);
         Self { w, sigma, below }
     }
 }
 
 /// What half a pair of walks needs to know.
-struct Walks<'a> {
-    ndf: GgxLanes,
+struct Walks<'a, N> {
+    ndf: N,
     fresnel: &'a ConductorFresnel<f32>,
     depth: Depth,
     /// Sum of orders ≥ 2.
     multiple: [f32x8; 3],
 }
 
-impl Microsurface<Ggx<f32>, Conductor<f32>> {
+impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
     /// f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by [`crate::microsurface::Estimator::PositionFree`], for
     /// each of `wo`. Orders above the first are evaluated with the `chance` of
     /// their lane, and weighted accordingly.
@@ -116,7 +115,7 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
     ) -> [Split<f32>; LANES] {
         let linked = wo.map(|wo| if self.links(wi, wo) { 1.0 } else { 0.0 });
         let linked = f32x8::from(linked).cmp_gt(f32x8::ZERO);
-        let ndf = GgxLanes::new(&self.ndf);
+        let ndf = self.ndf.in_lanes();
         let ends = [Directions::splat(wi), Directions::of(wo)].map(|w| End::new(&ndf, w));
         let [from, to] = &ends;
         let (density, length) = phase(&ndf, from.w, from.sigma, to.w);
@@ -154,7 +153,7 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
     }
 }
 
-impl Walks<'_> {
+impl<N: NdfLanes> Walks<'_, N> {
     /// The part of orders ≥ 2 that walks from `from` find in the lanes of `live`,
     /// times `scale`.
     #[inline]

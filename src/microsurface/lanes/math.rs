@@ -1,13 +1,14 @@
-//! GGX and Fresnel's reflectance for one direction in each lane: the formulas of
-//! [`Ggx`] and [`crate::microsurface::fresnel`], with masks for branches.
+//! Directions, the phase function of mirrors and Fresnel's reflectance for one direction
+//! in each lane: the formulas of [`crate::microsurface::fresnel`], with masks for branches.
 
 use wide::{CmpEq, CmpGe, CmpGt, f32x8};
 
-use crate::microsurface::{ConductorFresnel, Ggx, Rgb, Vector3};
+use super::ndf::NdfLanes;
+use crate::microsurface::{ConductorFresnel, Rgb, Vector3};
 
 /// A direction in each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Directions {
+pub struct Directions {
     pub x: f32x8,
     pub y: f32x8,
     pub z: f32x8,
@@ -71,89 +72,15 @@ impl Directions {
     }
 }
 
-/// A GGX distribution, the same in all lanes.
-pub(super) struct GgxLanes {
-    alpha_x: f32x8,
-    alpha_y: f32x8,
-    /// π α_x α_y
-    norm: f32x8,
-}
-
-impl GgxLanes {
-    #[inline]
-    pub fn new(ndf: &Ggx<f32>) -> Self {
-        Self {
-            alpha_x: ndf.alpha_x.into(),
-            alpha_y: ndf.alpha_y.into(),
-            norm: (std::f32::consts::PI * ndf.alpha_x * ndf.alpha_y).into(),
-        }
-    }
-
-    /// D of the normal along `h`, of any length; 0 below the horizon.
-    #[inline(always)]
-    pub fn density(&self, h: Directions) -> f32x8 {
-        let (x, y) = (h.x / self.alpha_x, h.y / self.alpha_y);
-        let squared = h.dot(h);
-        let ratio = squared / (x * x + y * y + h.z * h.z);
-        h.z.cmp_gt(f32x8::ZERO)
-            .blend(ratio * ratio / self.norm, f32x8::ZERO)
-    }
-
-    /// σ(w) and σ(−w).
-    #[inline(always)]
-    pub fn projected_areas(&self, w: Directions) -> [f32x8; 2] {
-        let (x, y) = (self.alpha_x * w.x, self.alpha_y * w.y);
-        let a = x * x + y * y;
-        let s = (w.z * w.z + a).sqrt();
-        let least = f32x8::HALF * a / (s + w.z.abs());
-        [
-            least + w.z.fast_max(f32x8::ZERO),
-            least + (-w.z).fast_max(f32x8::ZERO),
-        ]
-    }
-
-    /// Normals visible from `w`.
-    #[inline(always)]
-    pub fn sample_visible(&self, w: Directions, [u, v]: [f32x8; 2]) -> Directions {
-        let one = f32x8::ONE;
-        let w = Directions {
-            x: self.alpha_x * w.x,
-            y: self.alpha_y * w.y,
-            z: w.z,
-        };
-        let w = w.scaled(one / w.dot(w).sqrt());
-        let below = one - w.z;
-        let level = w.x * w.x + w.y * w.y;
-        let above = w.z.cmp_ge(f32x8::ZERO).blend(one + w.z, level / below);
-        let rise = (one - u) * above;
-        let sin = (u * above * (below + rise)).fast_max(f32x8::ZERO).sqrt();
-        let (sin_phi, cos_phi) = (f32x8::from(std::f32::consts::TAU) * v).sin_cos();
-        let m = Directions {
-            x: self.alpha_x * (sin * cos_phi + w.x),
-            y: self.alpha_y * (sin * sin_phi + w.y),
-            z: rise,
-        };
-        let length = m.dot(m).sqrt();
-        let level = level.sqrt();
-        let known = length.cmp_gt(f32x8::ZERO);
-        let slanted = level.cmp_gt(f32x8::ZERO);
-        // Seen from straight below, a horizontal normal.
-        let limit = [
-            slanted.blend(w.x / level, one),
-            slanted.blend(w.y / level, f32x8::ZERO),
-        ];
-        Directions {
-            x: known.blend(m.x / length, limit[0]),
-            y: known.blend(m.y / length, limit[1]),
-            z: known.blend(m.z / length, f32x8::ZERO),
-        }
-    }
-}
-
 /// The density of the phase function of mirrors from `w`, with `sigma` = σ(w),
 /// towards `o`, sr⁻¹; and |w + o|, twice the cosine at the facet.
 #[inline(always)]
-pub(super) fn phase(ndf: &GgxLanes, w: Directions, sigma: f32x8, o: Directions) -> (f32x8, f32x8) {
+pub(super) fn phase(
+    ndf: &impl NdfLanes,
+    w: Directions,
+    sigma: f32x8,
+    o: Directions,
+) -> (f32x8, f32x8) {
     let h = w.plus(o);
     let length = h.dot(h).sqrt();
     let density = ndf.density(h) / (f32x8::from(4.0) * sigma);

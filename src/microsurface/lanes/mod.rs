@@ -1,10 +1,21 @@
-//! Mirrors with GGX normals, eight walks at a time: one in each lane of a vector
+//! Mirrors, eight walks at a time: one in each lane of a vector
 //! register, in single precision. The model is that of the scalar code, which is what
 //! this is tested against.
 
+mod beckmann;
 mod eval;
 mod math;
+mod ndf;
 mod sample;
+
+pub use ndf::NdfInLanes;
+
+#[cfg(test)]
+pub(super) use {
+    beckmann::{erf_inv_of_twice_less_one, ierfc},
+    math::Directions,
+    ndf::NdfLanes,
+};
 
 use wide::{CmpEq, CmpGt, CmpLt, f32x8};
 

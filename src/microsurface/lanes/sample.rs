@@ -2,12 +2,13 @@
 
 use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
-use super::math::{Directions, GgxLanes, phase, reflectance};
+use super::math::{Directions, phase, reflectance};
+use super::ndf::{NdfInLanes, NdfLanes};
 use super::{LANES, survivors};
 use crate::microsurface::walk::Roulette;
-use crate::microsurface::{Conductor, Draw, Exit, Ggx, Microsurface, Rgb, Vector3, enters};
+use crate::microsurface::{Conductor, Draw, Exit, Microsurface, Rgb, Vector3, enters};
 
-impl Microsurface<Ggx<f32>, Conductor<f32>> {
+impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
     /// Eight times [`Microsurface::sample`], each with the [`Microsurface::pdf`] of its
     /// direction.
     pub fn sample_lanes(
@@ -19,7 +20,7 @@ impl Microsurface<Ggx<f32>, Conductor<f32>> {
             return [None; LANES];
         }
         let (zero, one) = (f32x8::ZERO, f32x8::ONE);
-        let ndf = GgxLanes::new(&self.ndf);
+        let ndf = self.ndf.in_lanes();
         let mut w = Directions::splat(wi);
         let [entrance, _] = ndf.projected_areas(w);
         let cos_i = w.z;

@@ -1,8 +1,28 @@
 //! Eight walks at a time against the scalar code in double precision.
 
 use super::*;
-use crate::microsurface::lanes::LANES;
+use crate::microsurface::lanes::{Directions, NdfLanes, erf_inv_of_twice_less_one, ierfc};
+use std::fmt::Debug;
 use wide::f32x8;
+
+macro_rules! for_each_distribution {
+    ($($check:ident)*) => {
+        mod ggx {
+            $(#[test] fn $check() { super::$check::<super::Ggx<f64>>(); })*
+        }
+        mod beckmann {
+            $(#[test] fn $check() { super::$check::<super::Beckmann<f64>>(); })*
+        }
+    };
+}
+
+for_each_distribution! {
+    pick_the_same_normals
+    project_the_same_areas
+    evaluate_what_the_walk_does
+    leave_as_the_walk_does
+    keep_the_energy
+}
 
 /// Independent numbers in every lane.
 struct Eight(Stream<Pcg64Mcg>);
@@ -13,8 +33,59 @@ impl Draw<f32x8> for Eight {
     }
 }
 
+/// A distribution in double precision, with its counterpart in lanes.
+trait Paired: Ndf<f64> + Debug {
+    type Single: NdfInLanes + Debug;
+
+    /// The relative error that the first order may have.
+    const PRECISION: f64;
+
+    /// What orders above the first are held against.
+    const REFERENCE: Estimator;
+
+    fn new(alpha_x: f64, alpha_y: f64) -> Self;
+    fn single(&self) -> Self::Single;
+}
+
+impl Paired for Ggx<f64> {
+    type Single = Ggx<f32>;
+    const PRECISION: f64 = 3e-5;
+    const REFERENCE: Estimator = Estimator::Walk;
+
+    fn new(alpha_x: f64, alpha_y: f64) -> Self {
+        Self { alpha_x, alpha_y }
+    }
+
+    fn single(&self) -> Ggx<f32> {
+        Ggx {
+            alpha_x: self.alpha_x as f32,
+            alpha_y: self.alpha_y as f32,
+        }
+    }
+}
+
+impl Paired for Beckmann<f64> {
+    type Single = Beckmann<f32>;
+    /// The exponent of e^{−x²} goes to 87, and has the error of a few numbers.
+    const PRECISION: f64 = 2e-4;
+    /// The walk comes upon the paths that matter so rarely, where a lobe is faint, that
+    /// its own error is not to be trusted.
+    const REFERENCE: Estimator = Estimator::TwoWalk;
+
+    fn new(alpha_x: f64, alpha_y: f64) -> Self {
+        Self { alpha_x, alpha_y }
+    }
+
+    fn single(&self) -> Beckmann<f32> {
+        Beckmann {
+            alpha_x: self.alpha_x as f32,
+            alpha_y: self.alpha_y as f32,
+        }
+    }
+}
+
 /// Metals of every Fresnel curve, on surfaces from smooth to rough.
-fn metals() -> Vec<(Ggx<f64>, ConductorFresnel<f64>)> {
+fn metals<N: Paired>() -> Vec<(N, ConductorFresnel<f64>)> {
     let fresnels = [
         ConductorFresnel::Constant(Rgb([1.0, 0.71, 0.29])),
         ConductorFresnel::Complex {
@@ -33,7 +104,7 @@ fn metals() -> Vec<(Ggx<f64>, ConductorFresnel<f64>)> {
     alphas
         .into_iter()
         .zip(fresnels)
-        .map(|((alpha_x, alpha_y), fresnel)| (Ggx { alpha_x, alpha_y }, fresnel))
+        .map(|((alpha_x, alpha_y), fresnel)| (N::new(alpha_x, alpha_y), fresnel))
         .collect()
 }
 
@@ -42,10 +113,10 @@ fn single(v: Vector3<f64>) -> Vector3<f32> {
 }
 
 /// The same metal in single precision.
-fn in_single(
-    ndf: &Ggx<f64>,
+fn in_single<N: Paired>(
+    ndf: &N,
     fresnel: &ConductorFresnel<f64>,
-) -> Microsurface<Ggx<f32>, Conductor<f32>> {
+) -> Microsurface<N::Single, Conductor<f32>> {
     let rgb = |c: Rgb<f64>| Rgb(c.0.map(|c| c as f32));
     let fresnel = match *fresnel {
         ConductorFresnel::Constant(color) => ConductorFresnel::Constant(rgb(color)),
@@ -60,10 +131,7 @@ fn in_single(
         },
     };
     Microsurface {
-        ndf: Ggx {
-            alpha_x: ndf.alpha_x as f32,
-            alpha_y: ndf.alpha_y as f32,
-        },
+        ndf: ndf.single(),
         facets: Conductor { fresnel },
     }
 }
@@ -75,10 +143,9 @@ fn around() -> [Vector3<f64>; LANES] {
 
 /// The first order to the precision of its numbers; those above it have the mean of
 /// the walk, whether they are evaluated always or with a chance.
-#[test]
-fn lanes_evaluate_what_the_walk_does() {
+fn evaluate_what_the_walk_does<N: Paired>() {
     let cosines = [0.95, 0.5, 0.15];
-    let metals = metals();
+    let metals = metals::<N>();
     let bound = worst_score(metals.len() * cosines.len() * LANES * 3);
     let mut worst: f64 = 0.0;
     for (k, (ndf, fresnel)) in metals.iter().enumerate() {
@@ -102,7 +169,10 @@ fn lanes_evaluate_what_the_walk_does() {
                         .zip(first.0.into_iter().zip(value.multiple.0))
                     {
                         let off = (f64::from(value) - first).abs();
-                        assert!(off <= 3e-5 * first, "{ndf:?} {cos} {wo:?}: {value} {first}");
+                        assert!(
+                            off <= N::PRECISION * first + 1e-30,
+                            "{ndf:?} {cos} {wo:?}: {value} {first}"
+                        );
                         found.add(multiple.into());
                     }
                 }
@@ -111,7 +181,7 @@ fn lanes_evaluate_what_the_walk_does() {
                 let mut expected = [Mean::default(); 3];
                 for _ in 0..100_000 {
                     let mut split = Split::default();
-                    exact.eval(Estimator::Walk, wi, wo, &mut rng.0, &mut split);
+                    exact.eval(N::REFERENCE, wi, wo, &mut rng.0, &mut split);
                     for (expected, value) in expected.iter_mut().zip(split.multiple.0) {
                         expected.add(value);
                     }
@@ -120,7 +190,7 @@ fn lanes_evaluate_what_the_walk_does() {
                     let score = found.score_against(expected).abs();
                     assert!(
                         score < bound,
-                        "{ndf:?} {fresnel:?}, cos {cos} → {wo:?}: {} ± {}, walk {} ± {}",
+                        "{ndf:?} {fresnel:?}, cos {cos} → {wo:?}: {} ± {}, scalar {} ± {}",
                         found.mean,
                         found.error(),
                         expected.mean,
@@ -144,11 +214,10 @@ fn cell(direction: Vector3<f64>, order: u32) -> usize {
 
 /// Exits fall into cells of direction and order as often as those of the scalar
 /// walk, with the same mean weight; their density is the scalar one.
-#[test]
-fn lanes_leave_as_the_walk_does() {
+fn leave_as_the_walk_does<N: Paired>() {
     const WALKS: usize = 400_000;
     let cosines = [1.0, 0.6, 0.1];
-    let metals = metals();
+    let metals = metals::<N>();
     let count = metals.len() * cosines.len();
     for (k, (ndf, fresnel)) in metals.iter().enumerate() {
         let exact = Microsurface {
@@ -210,11 +279,10 @@ fn lanes_leave_as_the_walk_does() {
 }
 
 /// White mirrors keep every walk, with its whole weight.
-#[test]
-fn lanes_keep_the_energy() {
+fn keep_the_energy<N: Paired>() {
     let white = ConductorFresnel::Constant(Rgb::white());
     for alpha in [1e-4, 0.3, 1.0, 2.0] {
-        let surface = in_single(&Ggx::isotropic(alpha), &white);
+        let surface = in_single(&N::new(alpha, alpha), &white);
         for cos in [1.0, 0.3, 1e-3] {
             let wi = single(Vector3::spherical(cos, 1.0));
             let mut rng = Eight(stream(7));
@@ -226,4 +294,96 @@ fn lanes_keep_the_energy() {
             }
         }
     }
+}
+
+/// Directions from the zenith to the nadir, with a slope that is far from α and with
+/// one that is near it.
+fn all_around() -> Vec<Vector3<f64>> {
+    let cosines = [1.0, 0.999_999, 0.99, 0.9, 0.6, 0.3, 0.1, 0.01, 1e-4];
+    let both = cosines.into_iter().flat_map(|cos| [cos, -cos]);
+    both.map(|cos| Vector3::spherical(cos, 0.7)).collect()
+}
+
+const STRETCHES: [(f64, f64); 5] = [(0.01, 0.01), (0.2, 0.2), (0.8, 0.2), (1.0, 1.0), (4.0, 4.0)];
+
+/// A direction in all lanes, as near as single precision has it, and that one.
+fn rounded(w: Vector3<f64>) -> (Directions, Vector3<f64>) {
+    let w = single(w);
+    let exact = Vector3::new(w.x.into(), w.y.into(), w.z.into());
+    (Directions::splat(w), exact.normalized())
+}
+
+/// The same normals from the same numbers. The latter are 6e-8 apart near 1, so where
+/// only few facets are above or below, more than rounding is left open.
+fn pick_the_same_normals<N: Paired>() {
+    let numbers = [
+        1e-6, 1e-4, 0.01, 0.1, 0.25, 0.5, 0.7, 0.9, 0.97, 0.999, 0.99999f32,
+    ];
+    let mut worst: f64 = 0.0;
+    for (alpha_x, alpha_y) in STRETCHES {
+        let ndf = N::new(alpha_x, alpha_y);
+        let lanes = ndf.single().in_lanes();
+        for w in all_around() {
+            let (w, exact) = rounded(w);
+            for (u, v) in numbers.into_iter().flat_map(|u| numbers.map(|v| (u, v))) {
+                let m = lanes.sample_visible(w, [u.into(), v.into()]);
+                let [x, y, z] = [m.x, m.y, m.z].map(|c| f64::from(c.to_array()[3]));
+                let expected = ndf.sample_visible(exact, [u.into(), v.into()]);
+                let rare = u.min(1.0 - u).min(v).min(1.0 - v);
+                let off = (Vector3::new(x, y, z) - expected).length() * f64::from(rare).sqrt();
+                assert!(
+                    off < 1e-5,
+                    "{ndf:?} {exact:?} {u} {v}: {x} {y} {z}, {expected:?}: {off:e}"
+                );
+                worst = worst.max(off);
+            }
+        }
+    }
+    println!("worst error {worst:.1e}");
+}
+
+/// As many digits as the exponent of e^{−x²} leaves: the area below the horizon is
+/// right to 1e-6 and what x² loses.
+fn project_the_same_areas<N: Paired>() {
+    for (alpha_x, alpha_y) in STRETCHES {
+        let ndf = N::new(alpha_x, alpha_y);
+        let lanes = ndf.single().in_lanes();
+        for w in all_around() {
+            let (w, exact) = rounded(w);
+            let found = lanes
+                .projected_areas(w)
+                .map(|area| f64::from(area.to_array()[3]));
+            for (found, expected) in found.into_iter().zip(ndf.projected_areas(exact)) {
+                let off = (found - expected).abs();
+                assert!(
+                    off <= N::PRECISION * expected + 1e-37,
+                    "{ndf:?} {exact:?}: {found:e}, {expected:e}"
+                );
+            }
+        }
+    }
+}
+
+/// ierfc and the Gaussian quantile against double precision, over all they are for.
+#[test]
+fn special_functions_have_their_digits() {
+    let in_lanes = |f: fn(f32x8) -> f32x8, x: f64| f64::from(f((x as f32).into()).to_array()[5]);
+    let (mut near, mut tail, mut quantile) = (0.0f64, 0.0f64, 0.0f64);
+    for i in 0..=93_000 {
+        let x = f64::from((f64::from(i) * 1e-4) as f32);
+        let off = in_lanes(ierfc, x) / x.ierfc() - 1.0;
+        if x <= 1.0 {
+            near = near.max(off.abs());
+        }
+        tail = tail.max(off.abs() / (1.0 + x * x));
+    }
+    for i in 1..1 << 16 {
+        let u = f64::from(i) / f64::from(1 << 16);
+        let expected = (2.0 * u - 1.0).erf_inv();
+        let off = in_lanes(erf_inv_of_twice_less_one, u) - expected;
+        quantile = quantile.max(off.abs() / expected.abs().max(0.1));
+    }
+    println!("ierfc {near:.1e}, per 1 + x² {tail:.1e}; quantile {quantile:.1e}");
+    assert!(near < 1e-6 && tail < 3e-7 && quantile < 2e-6);
+    assert_eq!(in_lanes(ierfc, f64::INFINITY), 0.0);
 }
