@@ -83,14 +83,19 @@ fn a_seed_is_an_image() {
 }
 
 /// Changes to the gold sphere that leave out more than any scene of the
-/// repository does.
+/// repository does, or that have what none has: walks on Beckmann metal, for several
+/// directions at once and for one.
 const PLAINER: &[&[(&str, &str)]] = &[
     &[
         ("lights", "[]"),
         ("materials.gold", "{diffuse: {color: 0.8}}"),
     ],
     &[("sampling.estimator", "single")],
+    &[("materials.gold", BECKMANN)],
+    &[("materials.gold", BECKMANN), ("sampling.branches", "1")],
 ];
+
+const BECKMANN: &str = "{conductor: {alpha: 0.5, distribution: beckmann}}";
 
 /// The leanest kernel and the one with everything give the same bits on every
 /// scene of the repository. These and a few plainer ones take all the kernels

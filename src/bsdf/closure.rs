@@ -34,6 +34,12 @@ pub enum Closure {
     BeckmannDiffuse(Rough<Beckmann<f32>, Diffuse<f32>>),
 }
 
+/// The closures that can be evaluated for several directions at once.
+pub(super) enum Laned<'a> {
+    Ggx(&'a Rough<Ggx<f32>, Conductor<f32>>),
+    Beckmann(&'a Rough<Beckmann<f32>, Conductor<f32>>),
+}
+
 /// Runs `$body` for whichever rough closure it is, and `$other` for the rest.
 macro_rules! each_rough {
     ($closure:expr, $rough:ident => $body:expr, $($other:tt)*) => {
@@ -112,6 +118,14 @@ impl Closure {
         if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
             return;
         }
+        // Eight walks take less time in lanes than one takes without. GGX gains as much
+        // where that is the noise, and loses where it is not: there one is cheap.
+        match self {
+            Self::BeckmannConductor(rough) if rough.is_eightfold() => {
+                return rough.eval_eightfold(wo, wi, rng, tally);
+            }
+            _ => {}
+        }
         each_rough!(self, rough => rough.eval(wo, wi, rng, tally),
             Self::Lambert(lambert) => tally.add(1, model::Rgb(lambert.eval(wi).to_array())),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => {}
@@ -120,9 +134,13 @@ impl Closure {
 
     /// The closure if it can be evaluated for several directions at once.
     #[inline(always)]
-    pub(super) fn in_lanes(&self) -> Option<&Rough<Ggx<f32>, Conductor<f32>>> {
+    pub(super) fn in_lanes<const F: u32>(&self) -> Option<Laned<'_>> {
+        if !self.is_in::<F>() {
+            return None;
+        }
         match self {
-            Self::GgxConductor(rough) if rough.suits_lanes() => Some(rough),
+            Self::GgxConductor(rough) if rough.suits_lanes() => Some(Laned::Ggx(rough)),
+            Self::BeckmannConductor(rough) if rough.suits_lanes() => Some(Laned::Beckmann(rough)),
             _ => None,
         }
     }

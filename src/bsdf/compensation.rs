@@ -249,16 +249,16 @@ impl Draw<f32> for SobolPoint {
 
 /// How wide a distribution of normals is.
 pub trait Width: Ndf<f32> {
-    /// The width from which the position-free estimator measured better than
-    /// two walks.
-    const POSITION_FREE_FROM: f32;
+    /// The width from which metals are evaluated in lanes.
+    const LANES_FROM: f32;
 
     /// The α of the isotropic surface that the table is asked for.
     fn width(&self) -> f32;
 }
 
 impl Width for Ggx<f32> {
-    const POSITION_FREE_FROM: f32 = 0.0;
+    /// There, all orders always are.
+    const LANES_FROM: f32 = 0.1;
 
     #[inline]
     fn width(&self) -> f32 {
@@ -267,7 +267,8 @@ impl Width for Ggx<f32> {
 }
 
 impl Width for Beckmann<f32> {
-    const POSITION_FREE_FROM: f32 = 0.15;
+    /// The first order alone takes less time.
+    const LANES_FROM: f32 = 0.0;
 
     #[inline]
     fn width(&self) -> f32 {

@@ -4,10 +4,10 @@ use arrayvec::ArrayVec;
 use glam::Vec3;
 use wide::f32x8;
 
-use super::closure::MIN_COS;
-use super::{ByOrder, Closure, Frame, Rough};
+use super::closure::{Laned, MIN_COS};
+use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
-use crate::microsurface::{self as model, Conductor, Draw, Ggx, LANES, Tally};
+use crate::microsurface::{self as model, Draw, LANES, Tally};
 use crate::scene::{Features, has};
 
 /// The most closures that a material may flatten to.
@@ -157,7 +157,7 @@ impl<const F: u32> Layers<F> {
     /// All there is, if it is one closure that can be evaluated for several directions
     /// at once, for less than that many evaluations cost.
     #[inline(always)]
-    pub fn in_lanes(&self) -> Option<InLanes<'_>> {
+    pub fn in_lanes(&self) -> Option<InLanes<'_, F>> {
         if !(has::<F>(Features::METALS) && has::<F>(Features::MULTIPLE_SCATTERING)) {
             return None;
         }
@@ -165,7 +165,7 @@ impl<const F: u32> Layers<F> {
             return None;
         };
         Some(InLanes {
-            rough: layer.closure.in_lanes()?,
+            closure: layer.closure.in_lanes::<F>()?,
             layer,
             normal: self.normal,
         })
@@ -232,13 +232,13 @@ fn same_side(normal: Vec3, wi: Vec3, local_z: f32) -> bool {
 }
 
 /// A closure at a hit, to be evaluated for several directions at once.
-pub struct InLanes<'a> {
-    rough: &'a Rough<Ggx<f32>, Conductor<f32>>,
+pub struct InLanes<'a, const F: u32> {
+    closure: Laned<'a>,
     layer: &'a Layer,
     normal: Vec3,
 }
 
-impl InLanes<'_> {
+impl<const F: u32> InLanes<'_, F> {
     /// Eight times [`Layers::sample`], each with the [`Layers::pdf`] of its direction.
     #[must_use]
     #[inline]
@@ -251,7 +251,12 @@ impl InLanes<'_> {
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return [None; LANES];
         }
-        self.rough.sample_lanes(wo, rng).map(|exit| {
+        let exits = match self.closure {
+            Laned::Ggx(rough) => rough.sample_lanes(wo, rng),
+            Laned::Beckmann(rough) if has::<F>(Features::BECKMANN) => rough.sample_lanes(wo, rng),
+            Laned::Beckmann(_) => [None; LANES],
+        };
+        exits.map(|exit| {
             let (sample, pdf) = exit.filter(|(sample, _)| sample.is_usable())?;
             let wi = self.layer.frame.to_world(sample.wi);
             let lit = same_side(self.normal, wi, sample.wi.z);
@@ -285,7 +290,13 @@ impl InLanes<'_> {
             // No light comes from below a metal.
             if lit { local } else { Vec3::NEG_Z }
         });
-        let values = self.rough.eval_lanes(wo, local, rng);
+        let values = match self.closure {
+            Laned::Ggx(rough) => rough.eval_lanes(wo, local, rng),
+            Laned::Beckmann(rough) if has::<F>(Features::BECKMANN) => {
+                rough.eval_lanes(wo, local, rng)
+            }
+            Laned::Beckmann(_) => [ByOrder::ZERO; LANES],
+        };
         values.map(|value| value * Rgb::splat(self.layer.share))
     }
 }

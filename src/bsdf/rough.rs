@@ -6,7 +6,7 @@ use wide::f32x8;
 use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, to_model};
 use crate::color::Rgb;
 use crate::microsurface::{
-    self as model, Conductor, Draw, Estimator, Ggx, LANES, Microsurface, Tally, Vector3,
+    self as model, Conductor, Draw, Estimator, LANES, Microsurface, NdfInLanes, Tally, Vector3,
 };
 use crate::scene::{Features, has};
 
@@ -64,9 +64,6 @@ const TURN: f32 = 1.5;
 /// so that rare bright paths do not show as specks.
 const LEAST_CHANCE: f32 = 1.0 / 16.0;
 
-/// α from which GGX metals are evaluated in lanes: there, all orders always are.
-const LANES_FROM: f32 = 0.1;
-
 /// A cosine, of tanθ = 2, that light inside the microsurface can have whatever
 /// the directions outside are.
 const INSIDE: f32 = 0.447_213_6;
@@ -95,11 +92,6 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
         match self.method {
             Method::Multiple(estimator) => self.eval_orders(estimator, 1.0, wo, wi, rng, tally),
             Method::Thinned(estimator) => {
-                let estimator = if self.surface.ndf.width() < N::POSITION_FREE_FROM {
-                    Estimator::TwoWalk
-                } else {
-                    estimator
-                };
                 let chance = self.chance(wo, wi);
                 self.eval_orders(estimator, chance, wo, wi, rng, tally);
             }
@@ -185,14 +177,20 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
     }
 }
 
-impl Rough<Ggx<f32>, Conductor<f32>> {
-    /// Whether [`Self::eval_lanes`] is worth its time. On smoother surfaces orders above
-    /// the first are evaluated so rarely that one evaluation is enough.
+impl<N: Width + NdfInLanes> Rough<N, Conductor<f32>> {
+    /// Whether [`Self::eval_lanes`] is worth its time. On surfaces that are too smooth
+    /// orders above the first are evaluated so rarely that one evaluation is enough.
     #[inline]
     pub fn suits_lanes(&self) -> bool {
-        matches!(self.method, Method::Thinned(Estimator::PositionFree))
-            && self.surface.ndf.width() >= LANES_FROM
+        self.is_eightfold()
+            && self.surface.ndf.width() >= N::LANES_FROM
             && self.surface.suits_position_free()
+    }
+
+    /// Whether [`Self::eval_eightfold`] is what its method asks for.
+    #[inline]
+    pub fn is_eightfold(&self) -> bool {
+        matches!(self.method, Method::Thinned(Estimator::PositionFree))
     }
 
     /// Eight times [`Self::sample`], each with the [`Self::pdf`] of its direction.
@@ -204,6 +202,36 @@ impl Rough<Ggx<f32>, Conductor<f32>> {
     ) -> [Option<(BsdfSample, f32)>; LANES] {
         let exits = self.surface.sample_lanes(to_model(wo), rng);
         exits.map(|exit| exit.map(|(exit, pdf)| (BsdfSample::from(exit), pdf)))
+    }
+
+    /// As [`Self::eval`], with the mean of eight evaluations of the orders above the
+    /// first whenever they are evaluated.
+    #[inline]
+    pub fn eval_eightfold(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        rng: &mut impl Draw<f32>,
+        tally: &mut impl Tally<f32>,
+    ) {
+        let (wo, wi) = (to_model(wo), to_model(wi));
+        tally.add(1, self.surface.eval_single(wo, wi, rng));
+        let chance = self.chance(wo, wi);
+        if chance < 1.0 && rng.draw() >= chance {
+            return;
+        }
+        let mut orders = Orders {
+            first: 2,
+            scale: chance.recip(),
+            tally,
+        };
+        if self.surface.suits_position_free() {
+            self.surface
+                .eval_multiple_in_lanes(wo, wi, rng, &mut orders);
+        } else {
+            self.surface
+                .eval(Estimator::TwoWalk, wo, wi, rng, &mut orders);
+        }
     }
 
     /// Estimates of f·|cosθ_i|, sr⁻¹, towards each of `wi`.

@@ -195,7 +195,8 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             return result;
         };
         let layers = self.scene.layers::<F>(&surface);
-        let lanes = layers.in_lanes();
+        let most = split.light_samples.len().max(split.branches.len());
+        let lanes = (most >= WORTH_LANES).then(|| layers.in_lanes()).flatten();
         if has::<F>(Features::LIGHT_SAMPLING) {
             let indices = split.light_samples;
             let at_once = lanes.as_ref().filter(|_| indices.len() >= WORTH_LANES);
@@ -323,7 +324,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         path: &Path,
         surface: &Surface,
         layers: &Layers<F>,
-        lanes: &InLanes<'_>,
+        lanes: &InLanes<'_, F>,
         sampler: &mut Sampler,
     ) -> (PathResult, Spread) {
         let wo = -path.ray.direction;

@@ -5,10 +5,13 @@ use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
 use super::math::{Directions, phase, reflectance};
 use super::ndf::{NdfInLanes, NdfLanes};
+use super::rotated::Rotated;
 use super::{LANES, survivors};
 use crate::microsurface::position_free::{COMMON, NEVER, RATIOS};
 use crate::microsurface::walk::Roulette;
-use crate::microsurface::{Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Vector3};
+use crate::microsurface::{
+    Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Tally, Vector3,
+};
 
 /// One stage of a [`Depth`] in each lane.
 #[derive(Clone, Copy)]
@@ -91,12 +94,12 @@ impl End {
 }
 
 /// What half a pair of walks needs to know.
-struct Walks<'a, N> {
+struct Walks<'a, N, T> {
     ndf: N,
     fresnel: &'a ConductorFresnel<f32>,
     depth: Depth,
-    /// Sum of orders ≥ 2.
-    multiple: [f32x8; 3],
+    /// Takes what each order ≥ 2 adds.
+    add: T,
 }
 
 impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
@@ -130,30 +133,69 @@ impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
         if chance.cmp_lt(f32x8::ONE).any() {
             live &= rng.draw().cmp_lt(chance);
         }
+        let mut multiple = [f32x8::ZERO; 3];
+        if live.any() {
+            self.add_multiple(ndf, &ends, live, rng, |_, value| {
+                for (sum, value) in multiple.iter_mut().zip(value) {
+                    *sum += value;
+                }
+            });
+        }
+        let single = single.map(|channel| channel.to_array());
+        let multiple = multiple.map(|sum| (sum / chance).to_array());
+        std::array::from_fn(|lane| Split {
+            single: Rgb(single.map(|channel| channel[lane])),
+            multiple: Rgb(multiple.map(|channel| channel[lane])),
+        })
+    }
+
+    /// Orders above the first of f(ω_i, ω_o) |cosθ_o| (sr⁻¹), the mean of eight
+    /// evaluations. As [`Self::eval_lanes`], it is for surfaces that suit it.
+    pub fn eval_multiple_in_lanes(
+        &self,
+        wi: Vector3<f32>,
+        wo: Vector3<f32>,
+        rng: &mut impl Draw<f32>,
+        tally: &mut impl Tally<f32>,
+    ) {
+        if !self.links(wi, wo) {
+            return;
+        }
+        let ndf = self.ndf.in_lanes();
+        let ends = [wi, wo].map(|w| End::new(&ndf, Directions::splat(w)));
+        let all = f32x8::ZERO.cmp_ge(f32x8::ZERO);
+        self.add_multiple(ndf, &ends, all, &mut Rotated::new(rng), |order, value| {
+            let mean = value.map(|channel| channel.reduce_add() * (1.0 / LANES as f32));
+            tally.add(order, Rgb(mean));
+        });
+    }
+
+    /// Gives what orders ≥ 2 add in the lanes of `live` to `add`, order by order.
+    #[inline]
+    fn add_multiple(
+        &self,
+        ndf: N::Lanes,
+        [from, to]: &[End; 2],
+        live: f32x8,
+        rng: &mut impl Draw<f32x8>,
+        add: impl FnMut(u32, [f32x8; 3]),
+    ) {
         let mut walks = Walks {
             ndf,
             fresnel: &self.facets.fresnel,
             depth: Depth {
                 stages: SmallVec::new(),
             },
-            multiple: [f32x8::ZERO; 3],
+            add,
         };
-        if live.any() {
-            rng.next_walk();
-            walks.add_half(from, to, live, f32x8::ONE, rng);
-            rng.next_walk();
-            walks.add_half(to, from, live, to.w.z / from.w.z, rng);
-        }
-        let single = single.map(|channel| channel.to_array());
-        let multiple = walks.multiple.map(|sum| (sum / chance).to_array());
-        std::array::from_fn(|lane| Split {
-            single: Rgb(single.map(|channel| channel[lane])),
-            multiple: Rgb(multiple.map(|channel| channel[lane])),
-        })
+        rng.next_walk();
+        walks.add_half(from, to, live, f32x8::ONE, rng);
+        rng.next_walk();
+        walks.add_half(to, from, live, to.w.z / from.w.z, rng);
     }
 }
 
-impl<N: NdfLanes> Walks<'_, N> {
+impl<N: NdfLanes, T: FnMut(u32, [f32x8; 3])> Walks<'_, N, T> {
     /// The part of orders ≥ 2 that walks from `from` find in the lanes of `live`,
     /// times `scale`.
     #[inline]
@@ -174,6 +216,11 @@ impl<N: NdfLanes> Walks<'_, N> {
         let mut order = 1;
         let mut ratio = zero;
         loop {
+            // Play before the dear part, for all that the next facet may absorb.
+            live &= survivors(Roulette::OF_CHANCE, &mut weight, scale, order, rng);
+            if live.none() {
+                return;
+            }
             // Pick the next direction.
             let m = self.ndf.sample_visible(w, [rng.draw(), rng.draw()]);
             let (d, cos) = w.mirrored(m);
@@ -186,10 +233,6 @@ impl<N: NdfLanes> Walks<'_, N> {
             } else {
                 ratio * (sigma / forth)
             });
-            live &= survivors(Roulette::OF_CHANCE, &mut weight, scale, order, rng);
-            if live.none() {
-                return;
-            }
             // Move the depth to the next facet.
             w = d.reversed();
             sigma = back;
@@ -204,6 +247,9 @@ impl<N: NdfLanes> Walks<'_, N> {
                 let chance = self.depth.climb(up, rate);
                 live &= chance.cmp_ge(f32x8::from(NEVER as f32));
                 weight = weight.map(|weight| weight * chance);
+                if live.none() {
+                    return;
+                }
             }
             order += 1;
             // Connect to the far end.
@@ -211,9 +257,8 @@ impl<N: NdfLanes> Walks<'_, N> {
             let tint = reflectance(self.fresnel, f32x8::HALF * length);
             let other = ratio * (f32x8::from(4.0) * sigma * density / to.sigma);
             let value = density * self.depth.escape(lambda) / (one + other);
-            for ((sum, weight), tint) in self.multiple.iter_mut().zip(weight).zip(tint) {
-                *sum += live.blend(weight * tint * value, zero);
-            }
+            let seen = [0, 1, 2].map(|c| live.blend(weight[c] * tint[c] * value, zero));
+            (self.add)(order, seen);
         }
     }
 }

@@ -6,6 +6,7 @@ mod beckmann;
 mod eval;
 mod math;
 mod ndf;
+mod rotated;
 mod sample;
 
 pub use ndf::NdfInLanes;

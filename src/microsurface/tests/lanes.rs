@@ -20,6 +20,7 @@ for_each_distribution! {
     pick_the_same_normals
     project_the_same_areas
     evaluate_what_the_walk_does
+    evaluate_one_direction_eightfold
     leave_as_the_walk_does
     keep_the_energy
 }
@@ -202,6 +203,61 @@ fn evaluate_what_the_walk_does<N: Paired>() {
         }
     }
     println!("worst score {worst:.2}, bound {bound:.2}");
+}
+
+/// The mean of eight evaluations of one direction has the mean of the scalar estimator,
+/// for the second order and for those above it.
+fn evaluate_one_direction_eightfold<N: Paired>() {
+    let metals = metals::<N>();
+    let ends = [(0.95, 0.7), (0.5, 0.8), (0.5, 0.3), (0.15, 0.4)];
+    let bound = worst_score(metals.len() * ends.len() * 2);
+    for (k, (ndf, fresnel)) in metals.iter().enumerate() {
+        let exact = Microsurface {
+            ndf: *ndf,
+            facets: Conductor { fresnel: *fresnel },
+        };
+        let lanes = in_single(ndf, fresnel);
+        for (e, (cos_i, cos_o)) in ends.into_iter().enumerate() {
+            let (wi, wo) = (
+                Vector3::spherical(cos_i, 0.4),
+                Vector3::spherical(cos_o, 3.2),
+            );
+            let mut rng = stream((200 + 10 * k + e) as u64);
+            let mut numbers = Stream(Pcg64Mcg::seed_from_u64((300 + 10 * k + e) as u64));
+            let mut means = [[Mean::default(); 2]; 2];
+            let mut note = |which: usize, orders: &[f64]| {
+                let second = orders.get(1).copied().unwrap_or(0.0);
+                means[which][0].add(second);
+                means[which][1].add(orders.iter().skip(2).sum());
+            };
+            for _ in 0..40_000 {
+                let mut found = PerOrder::default();
+                lanes.eval_multiple_in_lanes(single(wi), single(wo), &mut numbers, &mut found);
+                assert_eq!(found.0.first().map_or(0.0, |first| first.0[0]), 0.0);
+                note(
+                    0,
+                    &found.0.iter().map(|c| c.0[0].into()).collect::<Vec<_>>(),
+                );
+            }
+            for _ in 0..200_000 {
+                let mut expected = PerOrder::default();
+                exact.eval(N::REFERENCE, wi, wo, &mut rng, &mut expected);
+                note(1, &expected.0.iter().map(|c| c.0[0]).collect::<Vec<_>>());
+            }
+            for (order, (found, expected)) in means[0].iter().zip(&means[1]).enumerate() {
+                let score = found.score_against(expected).abs();
+                assert!(
+                    score < bound,
+                    "{ndf:?} {cos_i} → {cos_o}, order {}: {} ± {}, scalar {} ± {}",
+                    order + 2,
+                    found.mean,
+                    found.error(),
+                    expected.mean,
+                    expected.error()
+                );
+            }
+        }
+    }
 }
 
 /// Cells of direction and order that exits are counted in.
