@@ -212,7 +212,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--smithwalk", default=os.path.join(ROOT, "target", "release", "smithwalk"))
-    parser.add_argument("--samples", type=int, default=1 << 16, help="of an image of the square")
+    parser.add_argument("--samples", type=int, default=1 << 18, help="of an image of the square")
     parser.add_argument("--repeats", type=int, default=3, help="pairs of seeds for each estimator")
     parser.add_argument("--only", choices=("small", "elsewhere", "scenes"), help="this part alone")
     args = parser.parse_args()
