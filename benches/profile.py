@@ -31,7 +31,7 @@ PARTS = (
     ("hand-over to Embree", ("src/embree/",)),
     ("microsurface and BSDFs", ("src/microsurface/", "src/bsdf/")),
     ("mathematical functions (libm)", ("libm.so", "libm-", "/libm/")),
-    ("random numbers", ("src/sampler.rs", "sobol_burley-", "rand_pcg-", "rand-", "rand_core-")),
+    ("random numbers", ("src/sampler/", "sobol_burley-", "rand_pcg-", "rand-", "rand_core-")),
     ("lights", ("src/light/",)),
     ("surfaces, materials, textures", ("src/scene/", "src/texture/")),
     ("paths", ("src/integrator/", "src/color.rs")),

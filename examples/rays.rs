@@ -22,8 +22,9 @@ use smithwalk::film::{AovSet, Film, PixelFilter, Window};
 use smithwalk::integrator::{Limits, RenderReport, RenderRequest, render};
 use smithwalk::scene::{Scene, resolve};
 
-/// Samples per pixel: some million rays for the scenes of the repository.
-const SPP: u32 = 2;
+/// Samples per pixel: some of those that split as planned after the pilots, ten to thirty
+/// million rays for the scenes of the repository.
+const SPP: u32 = 8;
 
 /// Runs of each measurement.
 const REPEATS: usize = 5;
