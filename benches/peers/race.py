@@ -9,9 +9,9 @@ their own are the reference: the error of an image T is the mean of relMSE(T, A)
 and relMSE(T, B) less relMSE(A, B)/2, which is what the noise of A and B adds.
 Efficiency is relMSE × CPU seconds; less is better, and its ratio between two
 renderers is that of their times at equal error. relMSE is that of `smithwalk
-diff`: ε = 0.01, the worst 0.1 % of the pixels left out. So are the figures of the
-last columns, values beyond 10 robust standard deviations of the image, against A
-or B, whichever has fewer, so that a firefly of one of them does not count.
+diff`: ε = 0.01, the worst 0.1 % of the pixels left out. The last columns are
+from it too: values beyond 10 robust standard deviations of the image, and the
+largest, against A or B, whichever has fewer, so that no firefly of theirs counts.
 
 References that an earlier run left in DIR are kept, as their times do not count.
 

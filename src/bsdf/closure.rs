@@ -121,7 +121,7 @@ impl Closure {
         // Eight walks take less time in lanes than one takes without. GGX gains as much
         // where that is the noise, and loses where it is not: there one is cheap.
         match self {
-            Self::BeckmannConductor(rough) if rough.is_eightfold() => {
+            Self::BeckmannConductor(rough) if rough.is_automatic() => {
                 return rough.eval_eightfold(wo, wi, rng, tally);
             }
             _ => {}

@@ -182,14 +182,15 @@ impl<N: Width + NdfInLanes> Rough<N, Conductor<f32>> {
     /// orders above the first are evaluated so rarely that one evaluation is enough.
     #[inline]
     pub fn suits_lanes(&self) -> bool {
-        self.is_eightfold()
+        self.is_automatic()
             && self.surface.ndf.width() >= N::LANES_FROM
             && self.surface.suits_position_free()
     }
 
-    /// Whether [`Self::eval_eightfold`] is what its method asks for.
+    /// Whether the choice of the estimator was left to the material: only then may
+    /// lanes stand in for it.
     #[inline]
-    pub fn is_eightfold(&self) -> bool {
+    pub fn is_automatic(&self) -> bool {
         matches!(self.method, Method::Thinned(Estimator::PositionFree))
     }
 

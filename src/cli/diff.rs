@@ -214,6 +214,7 @@ fn write_table(
     )?;
     writeln!(out, "{:<28}{:>11.4e}", "RMSE", figures.rmse)?;
     writeln!(out, "{:<28}{:>11.4}", "FLIP, 0 to 1", figures.flip)?;
+    let pixels = *width as usize * *height as usize;
     let Outliers {
         robust_sd,
         largest_deviation,
@@ -224,7 +225,7 @@ fn write_table(
         "{:<28}{largest_deviation:>11.1} robust standard deviations of {:.3} %; {outliers} of {} values beyond {OUTLIER}",
         "largest difference",
         100.0 * robust_sd,
-        3 * (width * height) as usize - 3 * figures.non_finite_pixels,
+        3 * (pixels - figures.non_finite_pixels),
     )?;
     if let Some(z) = &figures.z {
         write_z(z, out)?;
