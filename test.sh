@@ -16,8 +16,8 @@ stage() {
 
 results=$(mktemp)
 trap 'rm -f "$results"' EXIT
-documentation() { RUSTDOCFLAGS='-D warnings' cargo doc --no-deps; }
-tests() { cargo test --no-fail-fast 2>&1 | tee "$results"; }
+documentation() { RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps; }
+tests() { cargo test --workspace --no-fail-fast 2>&1 | tee "$results"; }
 scripts() { find . \( -path ./target -o -path ./.deps -o -path ./.git \) -prune -o "$@" -print0; }
 shell_syntax() { scripts -name '*.sh' | xargs -0 -n 1 bash -n && bash -n .ci/run; }
 python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
@@ -26,8 +26,8 @@ stage set-up ./setup.sh --with-lints --with-blender
 [[ ${#failed[@]} -eq 0 ]] || exit 1
 stage shell shell_syntax
 stage python python_syntax
-stage format cargo fmt --check
-stage clippy cargo clippy --locked --all-targets -- -D warnings
+stage format cargo fmt --all --check
+stage clippy cargo clippy --locked --workspace --all-targets -- -D warnings
 stage documentation documentation
 stage tests tests
 

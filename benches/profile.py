@@ -29,7 +29,7 @@ SCENES = ("gold_sphere", "interior", "rough_glass", "brushed_metal")
 PARTS = (
     ("Embree", ("libembree", "libtbb")),
     ("hand-over to Embree", ("src/embree/",)),
-    ("microsurface and BSDFs", ("src/microsurface/", "src/bsdf/")),
+    ("microsurface and BSDFs", ("crates/model/src/", "src/bsdf/")),
     ("mathematical functions (libm)", ("libm.so", "libm-", "/libm/")),
     ("random numbers", ("src/sampler/", "sobol_burley-", "rand_pcg-", "rand-", "rand_core-")),
     ("lights", ("src/light/",)),

@@ -8,7 +8,7 @@
 use criterion::{BenchmarkId, Criterion};
 use rand::SeedableRng;
 use rand_pcg::Pcg32;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 

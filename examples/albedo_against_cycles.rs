@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 use measured::{GOLD, Glass, Mean, Metal, means, rows};
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
-use smithwalk::microsurface::*;
 use smithwalk::report::plot::{Axis, Chart, Mark, Series};
+use smithwalk_model::*;
 
 /// Points of each of 16 Sobol sets, for every albedo.
 const POINTS: u32 = 16_384;

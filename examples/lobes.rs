@@ -27,11 +27,11 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use smithwalk::bsdf::{Albedos, Method, Normals, Rough, WhiteFacets, Width};
-use smithwalk::microsurface::*;
 use smithwalk::report::heightfield::{
     Config, Estimate, LobeCase, Material, PSI_BINS, outgoing_lobes,
 };
 use smithwalk::report::plot::{Axis, Chart, Mark, Series};
+use smithwalk_model::*;
 
 /// Walks for each lobe.
 const WALKS: u32 = 4_000_000;

@@ -7,7 +7,7 @@
 use plotters::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 use std::path::Path;
 
 type Error = Box<dyn std::error::Error>;

@@ -23,7 +23,6 @@ pub mod integrator;
 pub mod light;
 pub mod mesh;
 pub mod metrics;
-pub mod microsurface;
 pub mod report;
 pub mod sampler;
 pub mod scene;

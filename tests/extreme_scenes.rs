@@ -3,9 +3,7 @@
 //! which everything is 1, darkness, a closed form. None may have a sample that
 //! is negative, infinite or not a number ([`common::film`] asserts it).
 
-mod common;
-
-use common::{Settings, image};
+use crate::common::{Settings, image};
 use exr::prelude::write_rgb_file;
 use smithwalk::film::Image;
 use std::fmt::Write as _;

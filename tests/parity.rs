@@ -2,11 +2,9 @@
 //! and 4.5, case by case: tiny scenes that `blender/measure_parity.py` built,
 //! exported and rendered with both.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{Settings, image};
+use crate::common::{Settings, image};
 use smithwalk::film::{Image, read_exr};
 
 /// Pixels on a side of the blocks that are compared: enough to average noise

@@ -1,12 +1,10 @@
 //! The renderer as a whole: what an image does and does not depend on, and the
 //! gold sphere against Cycles.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use common::{Settings, film, image, load};
+use crate::common::{Settings, film, image, load};
 use smithwalk::film::{Aov, Window, read_exr};
 use smithwalk::integrator::{KERNELS, kernel_for};
 use smithwalk::metrics::{mean, rel_bias, rel_bias_trimmed};

@@ -1,11 +1,11 @@
 //! The validation finds faults: each test plants one into the model, and a
 //! statement that must see it does not hold any more.
 
-use smithwalk::microsurface::{
+use smithwalk::report::validate::{Distribution, Effort, Model, Smithwalk, statement};
+use smithwalk_model::{
     At, Bounce, Conductor, Dielectric, Diffuse, Draw, Estimator, Exit, Facets, Microsurface, Ndf,
     Phase, Side, Tally, Vector3,
 };
-use smithwalk::report::validate::{Distribution, Effort, Model, Smithwalk, statement};
 
 /// What is wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,7 +190,7 @@ fn walk_from_the_top<I: Facets<f64>>(
         } else if path >= depth {
             return Some(Exit {
                 direction,
-                weight: smithwalk::microsurface::Rgb::white(),
+                weight: smithwalk_model::Rgb::white(),
                 order,
             });
         } else {

@@ -4,10 +4,8 @@ use glam::Vec3;
 
 use super::{BsdfSample, Interface, Lambert, Mirror, Rough};
 use crate::color::Rgb;
-use crate::microsurface::{
-    self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally,
-};
 use crate::scene::{Features, has};
+use smithwalk_model::{self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally};
 
 /// Everything that a surface can scatter with.
 #[derive(Clone, Copy, Debug)]

@@ -25,7 +25,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use crate::microsurface::{
+use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Facets, Ggx, Microsurface,
     Ndf, Rgb, Vector3,
 };
@@ -346,7 +346,7 @@ mod tests {
             surface,
             method: Method::Compensated(Albedos::of(normals, white)),
         };
-        let mut rng = crate::microsurface::Stream(rand_pcg::Pcg64Mcg::seed_from_u64(7));
+        let mut rng = smithwalk_model::Stream(rand_pcg::Pcg64Mcg::seed_from_u64(7));
         let sin = (1.0 - cos * cos).sqrt();
         let wo = Vec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos);
         let (mut sum, mut squares) = ([0.0; 3], 0.0);

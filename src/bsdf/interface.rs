@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::BsdfSample;
 use crate::color::Rgb;
-use crate::microsurface::{Draw, fresnel};
+use smithwalk_model::{Draw, fresnel};
 
 /// Reflects a share F of the light and refracts the rest.
 #[derive(Clone, Copy, Debug)]

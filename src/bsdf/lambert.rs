@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::BsdfSample;
 use crate::color::Rgb;
-use crate::microsurface::Draw;
+use smithwalk_model::Draw;
 
 /// A perfectly diffuse reflector, f = albedo/π.
 #[derive(Clone, Copy, Debug)]

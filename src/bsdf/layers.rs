@@ -7,8 +7,8 @@ use wide::f32x8;
 use super::closure::{Laned, MIN_COS};
 use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
-use crate::microsurface::{self as model, Draw, LANES, Tally};
 use crate::scene::{Features, has};
+use smithwalk_model::{self as model, Draw, LANES, Tally};
 
 /// The most closures that a material may flatten to.
 pub const MAX_LAYERS: usize = 8;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::BsdfSample;
 use crate::color::Rgb;
-use crate::microsurface::ConductorFresnel;
+use smithwalk_model::ConductorFresnel;
 
 /// Reflects about the normal and nowhere else.
 #[derive(Clone, Copy, Debug)]

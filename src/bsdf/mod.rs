@@ -40,7 +40,7 @@ pub use rough::{Method, Rough};
 use glam::Vec3;
 
 use crate::color::Rgb;
-use crate::microsurface::{self as model, Tally, Vector3};
+use smithwalk_model::{self as model, Tally, Vector3};
 
 /// A sampled direction.
 #[derive(Clone, Copy, Debug)]

@@ -5,10 +5,10 @@ use wide::f32x8;
 
 use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, to_model};
 use crate::color::Rgb;
-use crate::microsurface::{
+use crate::scene::{Features, has};
+use smithwalk_model::{
     self as model, Conductor, Draw, Estimator, LANES, Microsurface, NdfInLanes, Tally, Vector3,
 };
-use crate::scene::{Features, has};
 
 /// How a rough surface's scattering is computed.
 #[derive(Clone, Copy, Debug)]

@@ -13,8 +13,8 @@ use glam::Vec3;
 use smithwalk::bsdf::Layers;
 use smithwalk::color::Rgb;
 use smithwalk::description::{self, Estimator};
-use smithwalk::microsurface::Stream;
 use smithwalk::scene::{Material, Names, Surface, compile_material};
+use smithwalk_model::Stream;
 
 #[derive(clap::Subcommand)]
 pub enum Command {

@@ -11,9 +11,9 @@ use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::film::{Sample, Spread};
 use crate::light::{EmitterId, LightSample};
-use crate::microsurface::LANES;
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Features, Scene, Surface, has};
+use smithwalk_model::LANES;
 
 use super::sum::{Sum, mean};
 

@@ -5,7 +5,7 @@ use rand_pcg::Pcg32;
 use wide::f32x8;
 
 use super::{mix, sobol_4d};
-use crate::microsurface::{Draw, LANES};
+use smithwalk_model::{Draw, LANES};
 
 /// The numbers of one walk in each lane, in [0, 1): as many stratified ones for the
 /// first order or two as a set has, and any number of independent ones after them.

@@ -19,7 +19,7 @@ use rand::Rng;
 use rand_pcg::Pcg32;
 use sobol_burley::parts::{owen_scramble_int4_rev, owen_scramble_rev};
 
-use crate::microsurface::Draw;
+use smithwalk_model::Draw;
 
 /// Length of the Sobol sequence as a power of two; later samples start another
 /// one, scrambled afresh.

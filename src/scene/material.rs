@@ -10,10 +10,10 @@ use crate::bsdf::{
 };
 use crate::color::Rgb;
 use crate::description::{Axis, Channel};
-use crate::microsurface::{
+use crate::texture::Texture;
+use smithwalk_model::{
     self as model, Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Ggx, Microsurface,
 };
-use crate::texture::Texture;
 
 /// A number at every point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

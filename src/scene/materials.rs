@@ -12,7 +12,7 @@ use super::material::{
 use crate::bsdf::{Albedos, MAX_LAYERS, Method, Normals, WhiteFacets};
 use crate::color::Rgb;
 use crate::description as desc;
-use crate::microsurface::{self as model, ConductorFresnel};
+use smithwalk_model::{self as model, ConductorFresnel};
 
 /// What can keep a material that reads well from being rendered.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]

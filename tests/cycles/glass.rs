@@ -8,11 +8,11 @@
 //! sets here.
 
 use rayon::prelude::*;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
-use crate::judged::{Summary, worst_score};
-use crate::measured::{Glass, Mean, Points, means, rows};
-use crate::shortcuts;
+use crate::cycles::judged::{Summary, worst_score};
+use crate::cycles::measured::{Glass, Mean, Points, means, rows};
+use crate::cycles::shortcuts;
 
 /// Cycles and its counterpart here may differ by this, noise included, where
 /// the noise lets them: in rows whose error is a quarter of it at most.

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::measured::{Glass, Mean, Metal, SETS};
+use crate::cycles::measured::{Glass, Mean, Metal, SETS};
 
 impl Metal {
     /// What the row is, for messages.

@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// Reflectance of gold facets: red is a white furnace.
 pub const GOLD: [f64; 3] = [1.0, 0.71, 0.29];

@@ -7,11 +7,11 @@
 //! from that of 16 scrambled Sobol sets.
 
 use rayon::prelude::*;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
-use crate::judged::{Summary, worst_score};
-use crate::measured::{GOLD, Mean, Metal, means, rows};
-use crate::shortcuts;
+use crate::cycles::judged::{Summary, worst_score};
+use crate::cycles::measured::{GOLD, Mean, Metal, means, rows};
+use crate::cycles::shortcuts;
 
 /// Cycles and its counterpart here may differ by this, noise included.
 const BAR: f64 = 0.002;

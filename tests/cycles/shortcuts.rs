@@ -1,7 +1,7 @@
 //! Walks and single scattering with the shortcuts that Cycles takes, to see
 //! that they account for its difference from the model.
 
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// The most heights that Cycles' walk draws.
 const ORDERS: u32 = 10;

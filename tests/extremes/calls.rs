@@ -4,7 +4,7 @@ use super::domain::{ALPHAS, COSINES, ETAS, Metered, direction, largest, metals};
 use super::findings::{Findings, Kind};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// From this order on, a walk may end by roulette alone and its weight exceed 1.
 const LONG: u32 = 4096;
@@ -331,7 +331,7 @@ fn the_grid_holds_in_double_precision() {
 
 /// One seed in sixteen on all surfaces, the others where walks are short.
 ///
-/// `cargo test --release --test extremes -- --ignored --nocapture`
+/// `cargo test --release --test suite extremes:: -- --ignored --nocapture`
 #[test]
 #[ignore = "1e8 calls take six minutes"]
 fn the_grid_holds_for_a_hundred_million_calls() {

@@ -7,7 +7,7 @@ use super::means::{Mean, bound};
 use glam::Vec3;
 use rayon::prelude::*;
 use smithwalk::bsdf::{Closure, Interface, Lambert, Method, Mirror, Rough};
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// A closure, what single scattering on it is, and what it is called.
 #[derive(Clone)]

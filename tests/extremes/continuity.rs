@@ -7,7 +7,7 @@
 use super::domain::{Metered, direction, largest};
 use super::findings::{Findings, Kind};
 use super::means::Mean;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// Two arguments between which `f` changes by more than `tolerance` without
 /// any in between. `differ` says by how much two values do.

@@ -3,7 +3,7 @@
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use smithwalk::microsurface::{ConductorFresnel, Draw, Real, Rgb, Stream, Vector3};
+use smithwalk_model::{ConductorFresnel, Draw, Real, Rgb, Stream, Vector3};
 
 /// Roughness pairs: tiny, huge, and 10⁶ : 1. Zero is no microsurface; the
 /// renderer takes a mirror, an interface or Lambert's law there.

@@ -5,7 +5,7 @@ use super::calls::{Question, grid_at};
 use super::continuity::follow_normals;
 use super::domain::largest;
 use super::findings::{Findings, Kind};
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// GGX whose directions with |z| > 0.9999 have the σ, Λ and normals of the
 /// pole.

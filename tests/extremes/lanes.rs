@@ -5,7 +5,7 @@ use super::calls::starts;
 use super::domain::{ALPHAS, COSINES, Metered, direction, metals};
 use super::findings::{Findings, Kind};
 use rayon::prelude::*;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 use std::fmt::Debug;
 use wide::f32x8;
 

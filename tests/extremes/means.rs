@@ -1,7 +1,7 @@
 //! Means that must come out, over samples that fluctuate.
 
 use super::domain::stream;
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// A mean of independent samples with its standard error.

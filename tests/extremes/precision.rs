@@ -1,7 +1,7 @@
 //! What single precision costs against double.
 
 use super::domain::{ALPHAS, direction, stream};
-use smithwalk::microsurface::*;
+use smithwalk_model::*;
 
 /// Largest relative difference of single from double precision over a grid,
 /// the inputs being the same: those that single precision can hold.

@@ -1,7 +1,7 @@
 //! Densities: they integrate to one, rays meet what is sampled, and samples
 //! fall where the density says.
 
-use crate::common::*;
+use crate::light::common::*;
 use glam::{DVec3, Vec3};
 use rand::RngExt;
 use smithwalk::embree::Ray;

@@ -1,6 +1,6 @@
 //! The surroundings: orientation, densities, energy.
 
-use crate::common::*;
+use crate::light::common::*;
 use glam::{DVec3, Mat3, Vec3};
 use rand::RngExt;
 use smithwalk::description;

@@ -1,6 +1,6 @@
 //! Scenes far too small, far too large, and points where lights are not.
 
-use crate::common::*;
+use crate::light::common::*;
 use glam::{DVec3, Vec3};
 use rand::RngExt;
 use smithwalk::light::{Bulb, Lights, Outline, Shape, SunLight};

@@ -1,6 +1,6 @@
 //! The irradiance that samples give, against closed forms.
 
-use crate::common::*;
+use crate::light::common::*;
 use glam::{DVec3, Mat3, Vec3};
 use smithwalk::light::{AreaLight, Beam, Bulb, Lights, Outline, PointLight, Shape, SunLight};
 use std::f32::consts::PI;

@@ -1,7 +1,7 @@
 //! Cycles' light units, value by value, as measured with Blender 3.4.1, 4.5
 //! and 5.0. `P` is 200 W, the shading point 3 m below the light.
 
-use crate::common::*;
+use crate::light::common::*;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 use smithwalk::description::{self, AreaShape, LightKind, LightUnits, Transform};
 use smithwalk::embree::Ray;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::json;
 use smithwalk::bsdf::Layers;
 use smithwalk::description::Estimator;
-use smithwalk::microsurface::Draw;
+use smithwalk_model::Draw;
 
 use super::{MaterialArgs, Moments, layers};
 

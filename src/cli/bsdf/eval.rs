@@ -7,7 +7,7 @@ use anyhow::ensure;
 use glam::Vec3;
 use serde_json::json;
 use smithwalk::color::Rgb;
-use smithwalk::microsurface::PerOrder;
+use smithwalk_model::PerOrder;
 
 use super::super::render::EstimatorName;
 use super::{MaterialArgs, Moments, layers, parse_direction};

@@ -5,7 +5,7 @@ use std::io::Write;
 use glam::Vec3;
 use serde_json::json;
 use smithwalk::description::Estimator;
-use smithwalk::microsurface::Draw;
+use smithwalk_model::Draw;
 
 use super::{MaterialArgs, layers, parse_direction};
 

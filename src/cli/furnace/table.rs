@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use smithwalk::bsdf::Layers;
 use smithwalk::description::{Estimator, Material};
-use smithwalk::microsurface::{Draw, Stream};
 use smithwalk::scene::{Names, Surface, compile_material};
+use smithwalk_model::{Draw, Stream};
 
 pub const KINDS: [&str; 3] = ["conductor", "dielectric", "rough_diffuse"];
 pub const DISTRIBUTIONS: [&str; 2] = ["ggx", "beckmann"];

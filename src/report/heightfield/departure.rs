@@ -149,7 +149,7 @@ impl Departure {
 mod tests {
     use super::super::field::stream;
     use super::*;
-    use crate::microsurface::Draw;
+    use smithwalk_model::Draw;
 
     /// Batches of `bins` differences: `offset` plus uniform noise.
     fn batches(count: usize, offset: &[f64], noise: f64, seed: u64) -> Vec<Vec<f64>> {

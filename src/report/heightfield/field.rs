@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use crate::embree::{Accelerator, Device, EmbreeError, Geometry, Hit, Vertices};
-use crate::microsurface::{Draw, Stream};
+use smithwalk_model::{Draw, Stream};
 
 /// The random numbers of everything here.
 pub(super) type Random = Stream<Pcg64Mcg>;

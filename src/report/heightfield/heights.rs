@@ -7,8 +7,8 @@ use super::departure::{Departure, Distance, Estimate};
 use super::field::{Patch, Random, stream};
 use super::trace::{Flight, Meeting};
 use super::{Config, HeightFieldError};
-use crate::microsurface::heights::{Gaussian, Heights};
-use crate::microsurface::{Beckmann, Draw, Ndf, Side, Vector3};
+use smithwalk_model::heights::{Gaussian, Heights};
+use smithwalk_model::{Beckmann, Draw, Ndf, Side, Vector3};
 
 /// Bins of the histograms of heights.
 const BINS: usize = 60;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::departure::{Departure, Distance, Estimate};
 use super::field::{Patch, Random, stream};
 use super::{Config, HeightFieldError};
-use crate::microsurface::{
+use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Exit, Facets, Microsurface,
     Rgb, Vector3,
 };

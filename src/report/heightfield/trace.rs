@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::field::{Patch, Random};
 use crate::embree::Ray;
-use crate::microsurface::{Exit, Facets, Rgb, Side, Vector3};
+use smithwalk_model::{Exit, Facets, Rgb, Side, Vector3};
 
 /// How far a ray is followed past the border of the patch, as a share of its
 /// way there: far more than f32 rounds off, far less than the spare cell.
@@ -212,7 +212,7 @@ mod tests {
     use super::super::field::{Grid, stream, synthesize};
     use super::*;
     use crate::embree::Device;
-    use crate::microsurface::{Conductor, ConductorFresnel, Dielectric, Draw};
+    use smithwalk_model::{Conductor, ConductorFresnel, Dielectric, Draw};
 
     const GRID: Grid = Grid {
         side: 12.0,

@@ -4,9 +4,9 @@ use super::check::{Case, Check, Statement};
 use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream, uniform};
 use super::statistics::{Mean, chi_square, gauss};
-use crate::microsurface::{Draw, Estimator, Microsurface, Quadratic, Split, Total, Vector3};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
+use smithwalk_model::{Draw, Estimator, Microsurface, Quadratic, Split, Total, Vector3};
 use std::f64::consts::TAU;
 
 /// The relative standard error that the full effort reaches for every pair.

@@ -5,10 +5,10 @@ use super::grid::{Effort, cross};
 use super::model::{Distribution, Model, stream};
 use super::slopes::Slopes;
 use super::statistics::Mean;
-use crate::microsurface::heights::{Gaussian, Heights, Uniform};
-use crate::microsurface::{At, Estimator, Facets, Microsurface, Ndf, PerOrder, Side, Vector3};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
+use smithwalk_model::heights::{Gaussian, Heights, Uniform};
+use smithwalk_model::{At, Estimator, Facets, Microsurface, Ndf, PerOrder, Side, Vector3};
 
 /// Nodes a side of the quadratures over normals.
 const NODES: usize = 40;
@@ -130,7 +130,7 @@ pub fn one_direction<M: Model>(model: M, effort: Effort) -> Result<Statement, Pl
 
 /// Those that figures show.
 pub fn shown_distributions() -> Vec<Distribution> {
-    use crate::microsurface::{Beckmann, Ggx};
+    use smithwalk_model::{Beckmann, Ggx};
     vec![
         Distribution::Ggx(Ggx::isotropic(0.2)),
         Distribution::Ggx(Ggx::isotropic(1.0)),

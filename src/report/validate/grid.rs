@@ -1,7 +1,7 @@
 //! The configurations that are checked.
 
 use super::model::Distribution;
-use crate::microsurface::{Beckmann, Ggx, Vector3};
+use smithwalk_model::{Beckmann, Ggx, Vector3};
 
 /// How much is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +74,7 @@ impl Effort {
     /// `distributions` × `sphere`, but for directions from so far below that
     /// less than 10⁻⁹ of the surface can be seen.
     pub fn sphere_of_all(self) -> Vec<(Distribution, Vector3<f64>)> {
-        use crate::microsurface::Ndf;
+        use smithwalk_model::Ndf;
         let mut all = cross(&self.distributions(), &self.sphere());
         all.retain(|(d, w)| d.projected_area(*w) > 1e-9);
         all

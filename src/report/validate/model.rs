@@ -1,11 +1,11 @@
 //! What is validated: the model's parts, each replaceable by a faulty one.
 
-use crate::microsurface::{
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Estimator, Exit, Facets, Ggx,
     Microsurface, Ndf, Quadratic, Rgb, Stream, Tally, Vector3,
 };
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 /// The random numbers of a check.
 pub type Rng = Stream<Pcg64Mcg>;

@@ -3,10 +3,10 @@
 use super::grid::Effort;
 use super::model::Distribution;
 use super::model::{Model, stream};
-use crate::microsurface::{Estimator, Facets, Ggx, Microsurface, PerOrder, Vector3};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use serde::Serialize;
+use smithwalk_model::{Estimator, Facets, Ggx, Microsurface, PerOrder, Vector3};
 
 /// A cap on the order is to cost no more than this share of the energy.
 pub const CAP_LOSS: f64 = 1e-3;

@@ -5,9 +5,9 @@ use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream};
 use super::slopes::Slopes;
 use super::statistics::{Mean, chi_square, gauss};
-use crate::microsurface::{At, Draw, Facets, Ndf, Side, Vector3, fresnel};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
+use smithwalk_model::{At, Draw, Facets, Ndf, Side, Vector3, fresnel};
 use std::f64::consts::TAU;
 
 /// Nodes a side of the quadratures over normals.

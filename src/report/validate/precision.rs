@@ -3,10 +3,10 @@
 use super::check::{Case, Check};
 use super::grid::Effort;
 use super::model::Distribution;
-use crate::microsurface::{
+use serde::Serialize;
+use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Ggx, Microsurface, Ndf, Quadratic, Rgb, Vector3,
 };
-use serde::Serialize;
 
 /// The largest relative difference that is allowed.
 pub const BOUND: f64 = 1e-4;

@@ -6,7 +6,7 @@
 
 use super::model::Distribution;
 use super::statistics::gauss;
-use crate::microsurface::Vector3;
+use smithwalk_model::Vector3;
 
 /// Slope coordinates for the normals seen from a direction.
 pub struct Slopes {

@@ -5,11 +5,11 @@ use super::check::{Case, Check, Statement};
 use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream, uniform};
 use super::statistics::Mean;
-use crate::microsurface::{
-    Estimator, Facets, Ggx, Microsurface, Ndf, Rgb, Split, Tally, Total, Vector3,
-};
 use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
+use smithwalk_model::{
+    Estimator, Facets, Ggx, Microsurface, Ndf, Rgb, Split, Tally, Total, Vector3,
+};
 use std::f64::consts::TAU;
 
 /// The least |ln η| at which refraction bends light enough. With less, light

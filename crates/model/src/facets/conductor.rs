@@ -1,5 +1,5 @@
 use super::{At, Bounce, Draw, Facets, Ndf, Phase, Real, Side, Vector3};
-use crate::microsurface::ConductorFresnel;
+use crate::ConductorFresnel;
 
 /// Mirror facets that reflect by a Fresnel curve and absorb the rest.
 ///

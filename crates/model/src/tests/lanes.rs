@@ -1,7 +1,7 @@
 //! Eight walks at a time against the scalar code in double precision.
 
 use super::*;
-use crate::microsurface::lanes::{Directions, NdfLanes, erf_inv_of_twice_less_one, ierfc};
+use crate::lanes::{Directions, NdfLanes, erf_inv_of_twice_less_one, ierfc};
 use std::fmt::Debug;
 use wide::f32x8;
 

@@ -3,7 +3,7 @@
 use wide::{CmpGe, f32x8};
 
 use super::LANES;
-use crate::microsurface::Draw;
+use crate::Draw;
 
 /// Gives every lane the next number of one stream, moved on by a multiple of 1/8 of its
 /// own, modulo 1 (Cranley and Patterson 1976, "Randomization of Number Theoretic

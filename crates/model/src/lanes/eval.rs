@@ -7,11 +7,9 @@ use super::math::{Directions, phase, reflectance};
 use super::ndf::{NdfInLanes, NdfLanes};
 use super::rotated::Rotated;
 use super::{LANES, survivors};
-use crate::microsurface::position_free::{COMMON, NEVER, RATIOS};
-use crate::microsurface::walk::Roulette;
-use crate::microsurface::{
-    Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Tally, Vector3,
-};
+use crate::position_free::{COMMON, NEVER, RATIOS};
+use crate::walk::Roulette;
+use crate::{Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Tally, Vector3};
 
 /// One stage of a [`Depth`] in each lane.
 #[derive(Clone, Copy)]
@@ -103,7 +101,7 @@ struct Walks<'a, N, T> {
 }
 
 impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
-    /// f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by [`crate::microsurface::Estimator::PositionFree`], for
+    /// f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by [`crate::Estimator::PositionFree`], for
     /// each of `wo`. Orders above the first are evaluated with the `chance` of
     /// their lane, and weighted accordingly.
     ///

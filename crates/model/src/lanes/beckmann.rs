@@ -6,7 +6,7 @@ use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
 use super::math::Directions;
 use super::ndf::{NdfInLanes, NdfLanes};
-use crate::microsurface::Beckmann;
+use crate::Beckmann;
 
 /// A Beckmann distribution, the same in all lanes.
 pub struct BeckmannLanes {
@@ -82,7 +82,7 @@ impl NdfLanes for BeckmannLanes {
 }
 
 /// Numerator and denominator, P and Q, of t(x) in erfc(x) = e^{−x²} / (√π (x + t(x))),
-/// for 0 ≤ x ≤ [`STEEPEST`]; see [`crate::microsurface::Real::mills_excess`].
+/// for 0 ≤ x ≤ [`STEEPEST`]; see [`crate::Real::mills_excess`].
 ///
 /// The rational function of degrees 4 and 5 of the least relative error, 8.2e-8 (found
 /// by reweighted least squares). All terms are positive, so none of what is made of
@@ -112,7 +112,7 @@ fn mills_excess(x: f32x8) -> [f32x8; 2] {
 
 /// ∫ₓ^∞ erfc(t) dt = e^{−x²}/√π · t/(x + t), for x ≥ 0.
 #[inline(always)]
-pub(in crate::microsurface) fn ierfc(x: f32x8) -> f32x8 {
+pub(crate) fn ierfc(x: f32x8) -> f32x8 {
     let x = x.fast_min(STEEPEST.into());
     let [p, q] = mills_excess(x);
     f32x8::from(FRAC_1_PI.sqrt()) * (-x * x).exp() * (p / x.mul_add(q, p))
@@ -122,7 +122,7 @@ pub(in crate::microsurface) fn ierfc(x: f32x8) -> f32x8 {
 ///
 /// Giles 2010, "Approximating the erfinv function", single precision.
 #[inline(always)]
-pub(in crate::microsurface) fn erf_inv_of_twice_less_one(u: f32x8) -> f32x8 {
+pub(crate) fn erf_inv_of_twice_less_one(u: f32x8) -> f32x8 {
     let horner = |x: f32x8, terms: [f32; 9]| {
         terms
             .into_iter()

@@ -1,10 +1,10 @@
 //! Directions, the phase function of mirrors and Fresnel's reflectance for one direction
-//! in each lane: the formulas of [`crate::microsurface::fresnel`], with masks for branches.
+//! in each lane: the formulas of [`crate::fresnel`], with masks for branches.
 
 use wide::{CmpEq, CmpGe, CmpGt, f32x8};
 
 use super::ndf::NdfLanes;
-use crate::microsurface::{ConductorFresnel, Rgb, Vector3};
+use crate::{ConductorFresnel, Rgb, Vector3};
 
 /// A direction in each lane.
 #[derive(Clone, Copy)]
@@ -111,7 +111,7 @@ fn schlick(cos: f32x8, f0: f32) -> f32x8 {
 #[inline(always)]
 fn f82(cos: f32x8, f0: f32, edge: f32) -> f32x8 {
     let at = 1.0 / 7.0f32;
-    let dip = (crate::microsurface::fresnel::schlick(at, f0) - edge) / (at * (1.0 - at).powi(6));
+    let dip = (crate::fresnel::schlick(at, f0) - edge) / (at * (1.0 - at).powi(6));
     let c = (f32x8::ONE - cos).fast_max(f32x8::ZERO);
     let squared = c * c;
     (schlick(cos, f0) - f32x8::from(dip) * cos * (squared * squared * squared))

@@ -5,8 +5,8 @@ use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 use super::math::{Directions, phase, reflectance};
 use super::ndf::{NdfInLanes, NdfLanes};
 use super::{LANES, survivors};
-use crate::microsurface::walk::Roulette;
-use crate::microsurface::{Conductor, Draw, Exit, Microsurface, Rgb, Vector3, enters};
+use crate::walk::Roulette;
+use crate::{Conductor, Draw, Exit, Microsurface, Rgb, Vector3, enters};
 
 impl<N: NdfInLanes> Microsurface<N, Conductor<f32>> {
     /// Eight times [`Microsurface::sample`], each with the [`Microsurface::pdf`] of its

@@ -1,5 +1,5 @@
 use super::{At, Bounce, Draw, Facets, Ndf, Phase, Real, Rgb, Side, Vector3};
-use crate::microsurface::fresnel;
+use crate::fresnel;
 
 /// Smooth dielectric facets, which reflect and refract.
 ///

@@ -28,7 +28,7 @@
 //!
 //! ```
 //! use rand::SeedableRng;
-//! use smithwalk::microsurface::*;
+//! use smithwalk_model::*;
 //!
 //! let gold = Microsurface {
 //!     ndf: Ggx::isotropic(0.64_f32),

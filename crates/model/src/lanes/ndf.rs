@@ -3,7 +3,7 @@
 use wide::{CmpGe, CmpGt, f32x8};
 
 use super::math::Directions;
-use crate::microsurface::{Ggx, Ndf};
+use crate::{Ggx, Ndf};
 
 /// A distribution that can be evaluated and sampled in lanes.
 pub trait NdfInLanes: Ndf<f32> {

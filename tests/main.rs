@@ -1,0 +1,22 @@
+//! The renderer and the command from outside, in one program: linking Embree
+//! once takes less time than once for each file.
+
+mod bad_input;
+mod blender;
+mod camera;
+mod cli;
+mod common;
+mod converge;
+mod cycles;
+mod description;
+mod description_files;
+mod diff;
+mod extreme_scenes;
+mod extremes;
+mod film_files;
+mod heightfield;
+mod light;
+mod parity;
+mod render;
+mod validate;
+mod validate_faults;
