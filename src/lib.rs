@@ -18,6 +18,7 @@ pub mod camera;
 pub mod color;
 pub mod description;
 pub mod embree;
+pub mod features;
 pub mod film;
 pub mod integrator;
 pub mod light;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{BsdfSample, Interface, Lambert, Mirror, Rough};
 use crate::color::Rgb;
-use crate::scene::{Features, has};
+use crate::features::{Features, has};
 use smithwalk_model::{self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally};
 
 /// Everything that a surface can scatter with.

@@ -7,7 +7,7 @@ use wide::f32x8;
 use super::closure::{Laned, MIN_COS};
 use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
-use crate::scene::{Features, has};
+use crate::features::{Features, has};
 use smithwalk_model::{self as model, Draw, LANES, Tally};
 
 /// The most closures that a material may flatten to.

@@ -5,7 +5,7 @@ use wide::f32x8;
 
 use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, to_model};
 use crate::color::Rgb;
-use crate::scene::{Features, has};
+use crate::features::{Features, has};
 use smithwalk_model::{
     self as model, Conductor, Draw, Estimator, LANES, Microsurface, NdfInLanes, Tally, Vector3,
 };

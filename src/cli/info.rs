@@ -4,8 +4,9 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use serde_json::json;
+use smithwalk::features::Features;
 use smithwalk::integrator::{KERNELS, kernel_for};
-use smithwalk::scene::{Features, Scene};
+use smithwalk::scene::Scene;
 
 use super::scene::SceneArgs;
 

@@ -10,9 +10,10 @@ use std::time::Duration;
 use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use smithwalk::description::{Aov as AovName, Description, Estimator, Filter};
+use smithwalk::features::Features;
 use smithwalk::film::{Aov, AovSet, Film, OutputPath, PixelFilter, Window, sidecar_path};
 use smithwalk::integrator::{Limits, Progress, RenderReport, RenderRequest, Stop, begun, render};
-use smithwalk::scene::{Features, Scene};
+use smithwalk::scene::Scene;
 
 use super::scene::SceneArgs;
 

@@ -1,6 +1,7 @@
 //! The kernels: the path tracer, compiled for a few sets of features.
 
-use crate::scene::{Features, Scene};
+use crate::features::Features;
+use crate::scene::Scene;
 
 use super::render::{Job, render_pass};
 

@@ -9,10 +9,11 @@ use glam::Vec3;
 use crate::bsdf::{ByOrder, InLanes, Layers, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
+use crate::features::{Features, has};
 use crate::film::{Sample, Spread};
 use crate::light::{EmitterId, LightSample};
 use crate::sampler::{Dimension, Purpose, Sampler};
-use crate::scene::{Features, Scene, Surface, has};
+use crate::scene::{Scene, Surface};
 use smithwalk_model::LANES;
 
 use super::sum::{Sum, mean};

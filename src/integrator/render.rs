@@ -9,9 +9,10 @@ use rayon::prelude::*;
 use super::kernel::pass_for;
 use super::path::{PathTracer, Split};
 use crate::camera::Camera;
+use crate::features::{Features, has};
 use crate::film::{Aov, Draws, Film, FilmTile, PixelFilter, Spread};
 use crate::sampler::{Dimension, Sampler};
-use crate::scene::{Features, Scene, has};
+use crate::scene::Scene;
 
 /// When to stop. Whatever is reached first counts.
 #[derive(Clone, Copy, Debug)]

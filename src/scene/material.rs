@@ -4,12 +4,13 @@
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3};
 
-use super::{Features, Surface, has};
+use super::Surface;
 use crate::bsdf::{
     Closure, Frame, Interface, Lambert, Layer, Layers, MAX_LAYERS, Method, Mirror, Rough,
 };
 use crate::color::Rgb;
 use crate::description::{Axis, Channel};
+use crate::features::{Features, has};
 use crate::texture::Texture;
 use smithwalk_model::{
     self as model, Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Ggx, Microsurface,

@@ -1,7 +1,6 @@
 //! The scene as it is rendered: immutable, indices for names, radiometric
 //! quantities for the file's units, nothing that no ray asks for.
 
-mod features;
 mod load;
 mod material;
 mod materials;
@@ -9,7 +8,6 @@ mod resolve;
 mod surface;
 mod transform;
 
-pub use features::{Features, has};
 pub use load::Assets;
 pub use material::{
     Distribution, Facet, Leaf, Material, Number, RoughMaterial, Roughness, Tangent, Tint,
@@ -28,6 +26,7 @@ use crate::bsdf::Layers;
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
+use crate::features::{Features, has};
 use crate::light::Lights;
 use crate::texture::Texture;
 
