@@ -24,8 +24,8 @@ mod compensation;
 mod frame;
 mod interface;
 mod lambert;
-mod layers;
 mod mirror;
+mod mixture;
 mod rough;
 
 pub use closure::Closure;
@@ -33,8 +33,8 @@ pub use compensation::{Albedos, MeanWeight, Normals, WhiteFacets, Width};
 pub use frame::Frame;
 pub use interface::Interface;
 pub use lambert::Lambert;
-pub use layers::{InLanes, Layer, Layers, MAX_LAYERS, ScatterSample};
 pub use mirror::Mirror;
+pub use mixture::{Bsdf, InLanes, MAX_CLOSURES, ScatterSample, WeightedClosure};
 pub use rough::{Method, Rough};
 
 use glam::Vec3;

@@ -10,10 +10,9 @@ use std::process::ExitCode;
 
 use anyhow::ensure;
 use glam::Vec3;
-use smithwalk::bsdf::Layers;
 use smithwalk::color::Rgb;
 use smithwalk::description::{self, Estimator};
-use smithwalk::scene::{Material, Names, Surface, compile_material};
+use smithwalk::scene::{Material, Names, compile_material};
 use smithwalk_model::Stream;
 
 #[derive(clap::Subcommand)]
@@ -70,12 +69,6 @@ impl MaterialArgs {
             .wrapping_add(stream);
         Stream(rand_pcg::Pcg64Mcg::seed_from_u64(seed))
     }
-}
-
-/// The closures of a horizontal surface seen from above or from below; the
-/// tangent is along x.
-fn layers(material: &Material, from_above: bool) -> Layers {
-    material.layers(&[], &Surface::horizontal(from_above))
 }
 
 fn parse_direction(text: &str) -> Result<Vec3, String> {

@@ -6,14 +6,14 @@ use std::ops::Range;
 use arrayvec::ArrayVec;
 use glam::Vec3;
 
-use crate::bsdf::{ByOrder, InLanes, Layers, ScatterSample};
+use crate::bsdf::{Bsdf, ByOrder, InLanes, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
 use crate::film::{Sample, Spread};
 use crate::light::{EmitterId, LightSample};
 use crate::sampler::{Dimension, Purpose, Sampler};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Scene, Surface, View};
 use smithwalk_model::LANES;
 
 use super::sum::{Sum, mean};
@@ -137,6 +137,14 @@ impl Path {
         self.ray = surface.spawn(self.ray.direction);
     }
 
+    /// Who looks at the surface that the ray meets.
+    fn view(&self) -> View {
+        View {
+            wo: -self.ray.direction,
+            camera: self.bounce == 0,
+        }
+    }
+
     fn deposit(&self, radiance: &mut ByOrder, light: Rgb) {
         let light = self.throughput * light;
         if self.multiple {
@@ -195,17 +203,17 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let Some(surface) = self.next_surface(&mut trunk, &mut result) else {
             return result;
         };
-        let layers = self.scene.layers::<F>(&surface);
+        let bsdf = self.scene.bsdf::<F>(&surface, trunk.view());
         let most = split.light_samples.len().max(split.branches.len());
-        let lanes = (most >= WORTH_LANES).then(|| layers.in_lanes()).flatten();
+        let lanes = (most >= WORTH_LANES).then(|| bsdf.in_lanes()).flatten();
         if has::<F>(Features::LIGHT_SAMPLING) {
             let indices = split.light_samples;
             let at_once = lanes.as_ref().filter(|_| indices.len() >= WORTH_LANES);
             let (light, spread) = if let Some(lanes) = at_once {
-                self.connect_in_lanes(indices, &trunk, &surface, &layers, lanes, sampler)
+                self.connect_in_lanes(indices, &trunk, &surface, &bsdf, lanes, sampler)
             } else {
                 mean(indices, self.pilot, sampler, |_, sampler, result| {
-                    self.connect(&trunk, &surface, &layers, sampler, result);
+                    self.connect(&trunk, &surface, &bsdf, sampler, result);
                 })
             };
             result += light;
@@ -227,15 +235,15 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                     self.follow(&mut path, &surface, sampler, sample, Some(pdf))
                 })
             } else {
-                self.scatter(&mut path, &surface, &layers, sampler)
+                self.scatter(&mut path, &surface, &bsdf, sampler)
             };
             while goes_on {
                 let Some(surface) = self.next_surface(&mut path, result) else {
                     break;
                 };
-                let layers = self.scene.layers::<F>(&surface);
-                self.connect(&path, &surface, &layers, sampler, result);
-                goes_on = self.scatter(&mut path, &surface, &layers, sampler);
+                let bsdf = self.scene.bsdf::<F>(&surface, path.view());
+                self.connect(&path, &surface, &bsdf, sampler, result);
+                goes_on = self.scatter(&mut path, &surface, &bsdf, sampler);
             }
         };
         let (light, spread) = mean(split.branches, self.pilot, sampler, trace);
@@ -288,7 +296,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             if !has::<F>(Features::TRANSPARENCY) || path.vertex >= MAX_STRAIGHT {
                 return None;
             }
-            path.throughput *= self.scene.layers::<F>(&surface).transparency();
+            path.throughput *= self.scene.bsdf::<F>(&surface, path.view()).transparency();
             if path.throughput == Rgb::ZERO {
                 return None;
             }
@@ -301,15 +309,15 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         &self,
         path: &Path,
         surface: &Surface,
-        layers: &Layers<F>,
+        bsdf: &Bsdf<F>,
         sampler: &mut Sampler,
         result: &mut PathResult,
     ) {
-        if !has::<F>(Features::LIGHT_SAMPLING) || !layers.has_smooth() {
+        if !has::<F>(Features::LIGHT_SAMPLING) || !bsdf.has_smooth() {
             return;
         }
         let wo = -path.ray.direction;
-        let direct = self.direct(surface, layers, wo, path.vertex, sampler, &mut result.rays);
+        let direct = self.direct(surface, bsdf, wo, path.vertex, sampler, &mut result.rays);
         if path.multiple {
             result.radiance.multiple += path.throughput * direct.total();
         } else {
@@ -324,7 +332,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         indices: Range<u32>,
         path: &Path,
         surface: &Surface,
-        layers: &Layers<F>,
+        bsdf: &Bsdf<F>,
         lanes: &InLanes<'_, F>,
         sampler: &mut Sampler,
     ) -> (PathResult, Spread) {
@@ -335,7 +343,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         for index in indices.clone() {
             sampler.set_index(index);
             let rays = &mut sum.result.rays;
-            if let Some((wi, light)) = self.arriving(surface, layers, wo, vertex, sampler, rays) {
+            if let Some((wi, light)) = self.arriving(surface, bsdf, wo, vertex, sampler, rays) {
                 lit.push((index, wi, light));
             }
             if lit.is_full() || (index + 1 == indices.end && !lit.is_empty()) {
@@ -365,7 +373,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         &self,
         path: &mut Path,
         surface: &Surface,
-        layers: &Layers<F>,
+        bsdf: &Bsdf<F>,
         sampler: &mut Sampler,
     ) -> bool {
         let wo = -path.ray.direction;
@@ -376,11 +384,11 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             0.0
         };
         let mut stream = sampler.walk_stream(vertex, Purpose::Sample);
-        let Some(sample) = layers.sample(wo, choice, &mut stream) else {
+        let Some(sample) = bsdf.sample(wo, choice, &mut stream) else {
             return false;
         };
         let pdf = if has::<F>(Features::LIGHT_SAMPLING) && !sample.delta {
-            Some(layers.pdf(wo, sample.wi))
+            Some(bsdf.pdf(wo, sample.wi))
         } else {
             None
         };
@@ -478,17 +486,17 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     fn direct(
         &self,
         surface: &Surface,
-        layers: &Layers<F>,
+        bsdf: &Bsdf<F>,
         wo: Vec3,
         vertex: u32,
         sampler: &mut Sampler,
         rays: &mut u32,
     ) -> ByOrder {
-        let Some((wi, light)) = self.arriving(surface, layers, wo, vertex, sampler, rays) else {
+        let Some((wi, light)) = self.arriving(surface, bsdf, wo, vertex, sampler, rays) else {
             return ByOrder::ZERO;
         };
         let mut stream = sampler.walk_stream(vertex, Purpose::Light);
-        layers.eval(wo, wi, &mut stream) * light
+        bsdf.eval(wo, wi, &mut stream) * light
     }
 
     /// A light sample's direction and its L/p, with its multiple-importance weight,
@@ -496,7 +504,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     fn arriving(
         &self,
         surface: &Surface,
-        layers: &Layers<F>,
+        bsdf: &Bsdf<F>,
         wo: Vec3,
         vertex: u32,
         sampler: &mut Sampler,
@@ -508,7 +516,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
             .scene
             .lights
             .sample(surface.position, choice, position)?;
-        let pdf = layers.pdf(wo, light.direction);
+        let pdf = bsdf.pdf(wo, light.direction);
         if pdf <= 0.0 {
             return None;
         }
@@ -546,7 +554,11 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 return Some(radiance);
             };
             let blocker = self.scene.surface::<F>(&ray, &hit);
-            radiance *= self.scene.layers::<F>(&blocker).transparency();
+            let view = View {
+                wo: -ray.direction,
+                camera: false,
+            };
+            radiance *= self.scene.bsdf::<F>(&blocker, view).transparency();
             if radiance.max_element() <= 0.0 {
                 return None;
             }

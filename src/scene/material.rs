@@ -4,9 +4,9 @@
 use arrayvec::ArrayVec;
 use glam::{Vec2, Vec3};
 
-use super::Surface;
+use super::{Surface, View};
 use crate::bsdf::{
-    Closure, Frame, Interface, Lambert, Layer, Layers, MAX_LAYERS, Method, Mirror, Rough,
+    Bsdf, Closure, Frame, Interface, Lambert, MAX_CLOSURES, Method, Mirror, Rough, WeightedClosure,
 };
 use crate::color::Rgb;
 use crate::description::{Axis, Channel};
@@ -177,7 +177,7 @@ pub struct WeightedLeaf {
     /// The constant part of the product.
     pub share: f32,
     /// Textured factors; `true` takes one minus the factor.
-    pub factors: ArrayVec<(Number, bool), MAX_LAYERS>,
+    pub factors: ArrayVec<(Number, bool), MAX_CLOSURES>,
     /// The leaf.
     pub leaf: Leaf,
 }
@@ -193,7 +193,7 @@ impl WeightedLeaf {
     }
 }
 
-/// A material: at most [`MAX_LAYERS`] leaves.
+/// A material: at most [`MAX_CLOSURES`] leaves.
 #[derive(Clone, Debug, Default)]
 pub struct Material {
     /// The leaves of the mix; one for a plain material.
@@ -201,13 +201,18 @@ pub struct Material {
 }
 
 impl Material {
-    /// The closures at a point.
+    /// The closures at a point, weighted for who looks at it.
     #[must_use]
     #[inline]
-    pub fn layers<const F: u32>(&self, textures: &[Texture], surface: &Surface) -> Layers<F> {
-        let mut layers = Layers::new(surface.geometric_normal);
+    pub fn bsdf<const F: u32>(
+        &self,
+        textures: &[Texture],
+        surface: &Surface,
+        _view: View,
+    ) -> Bsdf<F> {
+        let mut bsdf = Bsdf::new(surface.geometric_normal);
         let most = if has::<F>(Features::MIXES) {
-            MAX_LAYERS
+            MAX_CLOSURES
         } else {
             1
         };
@@ -235,13 +240,23 @@ impl Material {
                     rough.frame::<F>(textures, surface),
                 ),
             };
-            layers.push(Layer {
-                share,
+            bsdf.push(WeightedClosure {
+                weight: Rgb::splat(share),
+                chance: share,
                 frame,
                 closure,
             });
         }
-        layers
+        bsdf
+    }
+
+    /// The closures of a horizontal surface whose tangent is along x, seen from
+    /// `wo`, above or below: what measurements of a material without textures
+    /// look at.
+    #[must_use]
+    pub fn horizontal(&self, wo: Vec3) -> Bsdf {
+        let view = View { wo, camera: false };
+        self.bsdf(&[], &Surface::horizontal(wo.z > 0.0), view)
     }
 
     /// The radiance that leaves the point with these texture coordinates on either side, W·m⁻²·sr⁻¹.

@@ -9,7 +9,7 @@ use super::material::{
     Distribution, Facet, Leaf, Material, Number, RoughMaterial, Roughness, Tangent, Tint,
     WeightedLeaf,
 };
-use crate::bsdf::{Albedos, MAX_LAYERS, Method, Normals, WhiteFacets};
+use crate::bsdf::{Albedos, MAX_CLOSURES, Method, Normals, WhiteFacets};
 use crate::color::Rgb;
 use crate::description as desc;
 use smithwalk_model::{self as model, ConductorFresnel};
@@ -18,8 +18,8 @@ use smithwalk_model::{self as model, ConductorFresnel};
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum MaterialError {
     /// Nested mixes with too many leaves.
-    #[error("the mix has more than {MAX_LAYERS} materials in all; the most is {MAX_LAYERS}")]
-    TooManyLayers,
+    #[error("the mix has more than {MAX_CLOSURES} materials in all; the most is {MAX_CLOSURES}")]
+    TooManyClosures,
     /// A name that is not among the materials.
     #[error("there is no material `{0}`")]
     UnknownMaterial(String),
@@ -55,7 +55,7 @@ pub fn compile_material(
 #[derive(Clone)]
 struct Above {
     share: f32,
-    factors: ArrayVec<(Number, bool), MAX_LAYERS>,
+    factors: ArrayVec<(Number, bool), MAX_CLOSURES>,
 }
 
 impl Default for Above {
@@ -76,7 +76,7 @@ impl Above {
             Number::Texture(..) => below
                 .factors
                 .try_push((factor, !is_b))
-                .map_err(|_| MaterialError::TooManyLayers)?,
+                .map_err(|_| MaterialError::TooManyClosures)?,
         }
         Ok(below)
     }
@@ -116,8 +116,8 @@ fn add_leaves(
         }
         desc::Material::Transparent(transparent) => Leaf::Transparent(transparent.color.into()),
     };
-    if leaves.len() == MAX_LAYERS {
-        return Err(MaterialError::TooManyLayers);
+    if leaves.len() == MAX_CLOSURES {
+        return Err(MaterialError::TooManyClosures);
     }
     leaves.push(WeightedLeaf {
         share: above.share,

@@ -15,14 +15,14 @@ pub use material::{
 };
 pub use materials::{MaterialError, Names, compile_material};
 pub use resolve::{ResolveError, Resolved, assemble, resolve};
-pub use surface::Surface;
+pub use surface::{Surface, View};
 pub use transform::{euler, to_affine};
 
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 
-use crate::bsdf::Layers;
+use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
@@ -200,11 +200,11 @@ impl Scene {
             .sum()
     }
 
-    /// The closures at a surface point, for the features `F`.
+    /// The closures at a surface point for who looks at it, for the features `F`.
     #[must_use]
     #[inline]
-    pub fn layers<const F: u32>(&self, surface: &Surface) -> Layers<F> {
-        self.materials[surface.material].layers(&self.textures, surface)
+    pub fn bsdf<const F: u32>(&self, surface: &Surface, view: View) -> Bsdf<F> {
+        self.materials[surface.material].bsdf(&self.textures, surface, view)
     }
 
     /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle, given the

@@ -37,6 +37,16 @@ pub struct Surface {
     pub normal_to_world: Mat3A,
 }
 
+/// Who looks at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Unit vector towards the viewer, world space.
+    pub wo: Vec3,
+    /// Whether that is the camera, through nothing but what lets light straight
+    /// through.
+    pub camera: bool,
+}
+
 /// Relative error of a point computed from barycentric weights: seven roundings
 /// of 2⁻²⁴ each and as many again for the transform of an instance.
 const POSITION_ERROR: f32 = 14.0 * (f32::EPSILON / 2.0);

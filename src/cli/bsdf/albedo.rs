@@ -5,11 +5,11 @@ use std::io::Write;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde_json::json;
-use smithwalk::bsdf::Layers;
+use smithwalk::bsdf::Bsdf;
 use smithwalk::description::Estimator;
 use smithwalk_model::Draw;
 
-use super::{MaterialArgs, Moments, layers};
+use super::{MaterialArgs, Moments};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -52,7 +52,7 @@ struct Albedo {
 }
 
 impl Albedo {
-    fn measure(layers: &Layers, wo: Vec3, walks: u64, rng: &mut impl Draw<f32>) -> Self {
+    fn measure(bsdf: &Bsdf, wo: Vec3, walks: u64, rng: &mut impl Draw<f32>) -> Self {
         let mut sums = Self {
             reflected: Moments::default(),
             transmitted: Moments::default(),
@@ -62,7 +62,7 @@ impl Albedo {
         };
         for _ in 0..walks {
             let choice = rng.draw();
-            let Some(sample) = layers.sample(wo, choice, rng) else {
+            let Some(sample) = bsdf.sample(wo, choice, rng) else {
                 continue;
             };
             let same_side = sample.wi.z * wo.z > 0.0;
@@ -104,11 +104,11 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let material = args.material.compile(Estimator::Auto)?;
     let mut rows = Vec::new();
     for (index, &cos) in args.cos.iter().enumerate() {
-        let layers = layers(&material, cos > 0.0);
         let (sin_phi, cos_phi) = args.azimuth.to_radians().sin_cos();
         let c = f64::from(cos.abs());
         let sin = (1.0 - c * c).sqrt() as f32;
         let wo = Vec3::new(sin * cos_phi, sin * sin_phi, cos);
+        let bsdf = material.horizontal(wo);
         let batches = args.samples.div_ceil(BATCH);
         // Collected in order before they are added, so that the sums do not
         // depend on the number of threads.
@@ -117,7 +117,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
             .map(|batch| {
                 let walks = BATCH.min(args.samples - batch * BATCH);
                 let stream = (index as u64) << 32 | batch;
-                Albedo::measure(&layers, wo, walks, &mut args.material.rng(stream))
+                Albedo::measure(&bsdf, wo, walks, &mut args.material.rng(stream))
             })
             .collect();
         let sums = parts

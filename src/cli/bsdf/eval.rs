@@ -10,7 +10,7 @@ use smithwalk::color::Rgb;
 use smithwalk_model::PerOrder;
 
 use super::super::render::EstimatorName;
-use super::{MaterialArgs, Moments, layers, parse_direction};
+use super::{MaterialArgs, Moments, parse_direction};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -35,10 +35,9 @@ pub struct Args {
 /// of one estimate in nanoseconds, measured without the tally of orders.
 pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let material = args.material.compile(args.estimator.into())?;
-    let above = args.wo.z > 0.0;
-    let layers = layers(&material, above);
+    let bsdf = material.horizontal(args.wo);
     ensure!(
-        layers.has_smooth(),
+        bsdf.has_smooth(),
         "all of this material's light goes into single directions"
     );
     let (wo, wi) = (args.wo, args.wi);
@@ -48,7 +47,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut rng = args.material.rng(0);
     for _ in 0..args.samples {
         let mut estimate = PerOrder::default();
-        layers.eval_orders(wo, wi, &mut rng, &mut estimate);
+        bsdf.eval_orders(wo, wi, &mut rng, &mut estimate);
         let values = || estimate.0.iter().map(|value| Rgb::from(value.0));
         total.add(values().sum());
         if orders.len() < estimate.0.len() {
@@ -61,7 +60,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut rng = args.material.rng(1);
     let start = Instant::now();
     for _ in 0..args.samples {
-        std::hint::black_box(layers.eval(wo, wi, &mut rng));
+        std::hint::black_box(bsdf.eval(wo, wi, &mut rng));
     }
     let ns = start.elapsed().as_secs_f64() * 1e9 / args.samples as f64;
 

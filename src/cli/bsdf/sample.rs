@@ -7,7 +7,7 @@ use serde_json::json;
 use smithwalk::description::Estimator;
 use smithwalk_model::Draw;
 
-use super::{MaterialArgs, layers, parse_direction};
+use super::{MaterialArgs, parse_direction};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -25,8 +25,7 @@ pub struct Args {
 /// grazing angles) have no row: `samples` says how many were asked for.
 pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let material = args.material.compile(Estimator::Auto)?;
-    let above = args.wo.z > 0.0;
-    let layers = layers(&material, above);
+    let bsdf = material.horizontal(args.wo);
     let wo = args.wo;
     let mut rng = args.material.rng(0);
     let mut columns: [Vec<f32>; 4] = Default::default();
@@ -34,11 +33,11 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut orders = Vec::new();
     for _ in 0..args.samples {
         let choice = rng.draw();
-        let Some(sample) = layers.sample(wo, choice, &mut rng) else {
+        let Some(sample) = bsdf.sample(wo, choice, &mut rng) else {
             continue;
         };
         let wi = sample.wi;
-        let pdf = layers.pdf(wo, wi);
+        let pdf = bsdf.pdf(wo, wi);
         for (column, value) in columns.iter_mut().zip([wi.x, wi.y, wi.z, pdf]) {
             column.push(value);
         }

@@ -8,9 +8,9 @@ use glam::Vec3;
 use rand::SeedableRng;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use smithwalk::bsdf::Layers;
+use smithwalk::bsdf::Bsdf;
 use smithwalk::description::{Estimator, Material};
-use smithwalk::scene::{Names, Surface, compile_material};
+use smithwalk::scene::{Names, compile_material};
 use smithwalk_model::{Draw, Stream};
 
 pub const KINDS: [&str; 3] = ["conductor", "dielectric", "rough_diffuse"];
@@ -77,12 +77,11 @@ pub fn measure(samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
                 textures: &BTreeMap::new(),
                 estimator: Estimator::Auto,
             };
-            let layers =
-                compile_material(&material, &names)?.layers(&[], &Surface::horizontal(true));
             let stream = seed.wrapping_mul(1 << 20).wrapping_add(index as u64);
             let mut rng = Stream(rand_pcg::Pcg64Mcg::seed_from_u64(stream));
             let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-            let (sampled, combined) = albedos(&layers, wo, samples, &mut rng);
+            let bsdf = compile_material(&material, &names)?.horizontal(wo);
+            let (sampled, combined) = albedos(&bsdf, wo, samples, &mut rng);
             Ok(Row {
                 kind,
                 distribution,
@@ -99,7 +98,7 @@ pub fn measure(samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
 
 /// Mean and standard error of both estimates.
 fn albedos(
-    layers: &Layers,
+    bsdf: &Bsdf,
     wo: Vec3,
     samples: u64,
     rng: &mut impl Draw<f32>,
@@ -109,15 +108,15 @@ fn albedos(
     for _ in 0..samples {
         let mut both = 0.0;
         let choice = rng.draw();
-        let walk = layers.sample(wo, choice, rng);
+        let walk = bsdf.sample(wo, choice, rng);
         if let Some(sample) = walk {
-            let pdf = layers.pdf(wo, sample.wi);
+            let pdf = bsdf.pdf(wo, sample.wi);
             both += sample.weight.x * pdf / (pdf + cosine_pdf(sample.wi));
         }
         sampled.add(walk.map_or(0.0, |sample| sample.weight.x));
         let wi = cosine_direction(rng);
-        let value = layers.eval(wo, wi, rng).total().x;
-        both += value / (layers.pdf(wo, wi) + cosine_pdf(wi)).max(f32::MIN_POSITIVE);
+        let value = bsdf.eval(wo, wi, rng).total().x;
+        both += value / (bsdf.pdf(wo, wi) + cosine_pdf(wi)).max(f32::MIN_POSITIVE);
         combined.add(both);
     }
     (sampled.mean(samples), combined.mean(samples))

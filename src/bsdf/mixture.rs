@@ -11,14 +11,16 @@ use crate::features::{Features, has};
 use smithwalk_model::{self as model, Draw, LANES, Tally};
 
 /// The most closures that a material may flatten to.
-pub const MAX_LAYERS: usize = 8;
+pub const MAX_CLOSURES: usize = 8;
 
-/// One closure of a mix.
+/// One closure of the mix, weighted for the viewer's direction.
 #[derive(Clone, Copy, Debug)]
-pub struct Layer {
-    /// Its share of the mix; the shares of a material's closures, emission
-    /// among them, add up to one.
-    pub share: f32,
+pub struct WeightedClosure {
+    /// The factor on its light, per channel. It may depend on `wo`: a coat weighs
+    /// what lies below it by one minus its own albedo.
+    pub weight: Rgb,
+    /// How often it is sampled, relative to the others'.
+    pub chance: f32,
     /// The frame it scatters in, z on the viewer's side.
     pub frame: Frame,
     /// What it scatters like.
@@ -43,35 +45,35 @@ pub struct ScatterSample {
 
 /// All closures at a hit, with the geometric normal that tells reflection from
 /// transmission. What is done with them is compiled for the features `F`:
-/// without mixes there is at most one, of share one.
+/// without mixes there is at most one, of weight one.
 #[derive(Clone, Debug)]
-pub struct Layers<const F: u32 = { Features::EVERYTHING.bits() }> {
-    layers: ArrayVec<Layer, MAX_LAYERS>,
+pub struct Bsdf<const F: u32 = { Features::EVERYTHING.bits() }> {
+    closures: ArrayVec<WeightedClosure, MAX_CLOSURES>,
     /// Geometric normal on the viewer's side, world space.
     normal: Vec3,
-    /// The sum of the shares.
+    /// The sum of the chances.
     total: f32,
 }
 
-impl<const F: u32> Layers<F> {
+impl<const F: u32> Bsdf<F> {
     /// None yet, on a surface with this geometric normal (viewer's side).
     #[must_use]
     pub fn new(normal: Vec3) -> Self {
         Self {
-            layers: ArrayVec::new(),
+            closures: ArrayVec::new(),
             normal,
             total: 0.0,
         }
     }
 
-    /// Adds a closure; those without a share are left out.
+    /// Adds a closure; those that are never sampled are left out.
     ///
     /// # Panics
-    /// Past [`MAX_LAYERS`], which scenes are checked for when they are resolved.
-    pub fn push(&mut self, layer: Layer) {
-        if layer.share > 0.0 {
-            self.total += layer.share;
-            self.layers.push(layer);
+    /// Past [`MAX_CLOSURES`], which scenes are checked for when they are resolved.
+    pub fn push(&mut self, part: WeightedClosure) {
+        if part.chance > 0.0 {
+            self.total += part.chance;
+            self.closures.push(part);
         }
     }
 
@@ -79,42 +81,41 @@ impl<const F: u32> Layers<F> {
     #[must_use]
     #[inline(always)]
     pub fn has_smooth(&self) -> bool {
-        self.known().any(|layer| !layer.closure.is_delta())
+        self.known().any(|part| !part.closure.is_delta())
     }
 
     /// The share of light that goes straight through, per channel.
     #[must_use]
     pub fn transparency(&self) -> Rgb {
-        let straight = |layer: &Layer| match layer.closure {
-            Closure::Transparent(color) => color * layer.share,
+        let straight = |part: &WeightedClosure| match part.closure {
+            Closure::Transparent(color) => color * part.weight,
             _ => Rgb::ZERO,
         };
-        self.layers.iter().map(straight).sum()
+        self.closures.iter().map(straight).sum()
     }
 
-    /// Chooses a closure by its share with `choice` in [0, 1), and samples it.
+    /// Chooses a closure by its chance with `choice` in [0, 1), and samples it.
     #[inline]
     pub fn sample(&self, wo: Vec3, choice: f32, rng: &mut impl Draw<f32>) -> Option<ScatterSample> {
-        let layer = self.choose(choice)?;
-        if !layer.closure.is_in::<F>() {
+        let part = self.choose(choice)?;
+        if !part.closure.is_in::<F>() {
             return None;
         }
-        let sample = layer.closure.sample(layer.frame.to_local(wo), rng)?;
-        let wi = layer.frame.to_world(sample.wi);
+        let sample = part.closure.sample(part.frame.to_local(wo), rng)?;
+        let wi = part.frame.to_world(sample.wi);
         if !self.same_side(wi, sample.wi.z) {
             return None;
         }
         Some(ScatterSample {
             wi,
-            // share / (share / total)
             weight: if has::<F>(Features::MIXES) {
-                sample.weight * self.total
+                sample.weight * (part.weight / part.chance * self.total)
             } else {
                 sample.weight
             },
             order: sample.order,
-            delta: layer.closure.is_delta(),
-            straight: matches!(layer.closure, Closure::Transparent(_)),
+            delta: part.closure.is_delta(),
+            straight: matches!(part.closure, Closure::Transparent(_)),
         })
     }
 
@@ -136,20 +137,20 @@ impl<const F: u32> Layers<F> {
         rng: &mut impl Draw<f32>,
         tally: &mut impl Tally<f32>,
     ) {
-        for layer in self.known() {
-            let local = layer.frame.to_local(wi);
+        for part in self.known() {
+            let local = part.frame.to_local(wi);
             if !self.same_side(wi, local.z) {
                 continue;
             }
-            let local_wo = layer.frame.to_local(wo);
+            let local_wo = part.frame.to_local(wo);
             if has::<F>(Features::MIXES) {
                 let mut scaled = Scaled {
-                    share: layer.share,
+                    weight: part.weight.into(),
                     tally: &mut *tally,
                 };
-                layer.closure.eval(local_wo, local, rng, &mut scaled);
+                part.closure.eval(local_wo, local, rng, &mut scaled);
             } else {
-                layer.closure.eval(local_wo, local, rng, tally);
+                part.closure.eval(local_wo, local, rng, tally);
             }
         }
     }
@@ -161,12 +162,12 @@ impl<const F: u32> Layers<F> {
         if !(has::<F>(Features::METALS) && has::<F>(Features::MULTIPLE_SCATTERING)) {
             return None;
         }
-        let [layer] = self.layers.as_slice() else {
+        let [part] = self.closures.as_slice() else {
             return None;
         };
         Some(InLanes {
-            closure: layer.closure.in_lanes::<F>()?,
-            layer,
+            closure: part.closure.in_lanes::<F>()?,
+            part,
             normal: self.normal,
         })
     }
@@ -175,10 +176,10 @@ impl<const F: u32> Layers<F> {
     #[must_use]
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let density = |layer: &Layer| {
-            let local = layer.frame.to_local(wi);
+        let density = |part: &WeightedClosure| {
+            let local = part.frame.to_local(wi);
             if self.same_side(wi, local.z) {
-                layer.closure.pdf(layer.frame.to_local(wo), local)
+                part.closure.pdf(part.frame.to_local(wo), local)
             } else {
                 0.0
             }
@@ -186,36 +187,36 @@ impl<const F: u32> Layers<F> {
         if !has::<F>(Features::MIXES) {
             return self.known().next().map_or(0.0, density);
         }
-        let sum: f32 = self.known().map(|layer| density(layer) * layer.share).sum();
+        let sum: f32 = self.known().map(|part| density(part) * part.chance).sum();
         if sum > 0.0 { sum / self.total } else { 0.0 }
     }
 
     /// The closures, of kinds that there is code for: all.
     #[inline(always)]
-    fn known(&self) -> impl Iterator<Item = &Layer> {
+    fn known(&self) -> impl Iterator<Item = &WeightedClosure> {
         let most = if has::<F>(Features::MIXES) {
-            MAX_LAYERS
+            MAX_CLOSURES
         } else {
             1
         };
-        let layers = self.layers.iter().take(most);
-        layers.filter(|layer| layer.closure.is_in::<F>())
+        let closures = self.closures.iter().take(most);
+        closures.filter(|part| part.closure.is_in::<F>())
     }
 
     #[inline(always)]
-    fn choose(&self, choice: f32) -> Option<&Layer> {
+    fn choose(&self, choice: f32) -> Option<&WeightedClosure> {
         if !has::<F>(Features::MIXES) {
-            return self.layers.first();
+            return self.closures.first();
         }
         let mut rest = choice * self.total;
-        for layer in &self.layers {
-            rest -= layer.share;
+        for part in &self.closures {
+            rest -= part.chance;
             if rest < 0.0 {
-                return Some(layer);
+                return Some(part);
             }
         }
         // Rounding may leave a hair's breadth past the last one.
-        self.layers.last()
+        self.closures.last()
     }
 
     /// Interpolated normals make directions that are above the shading normal's
@@ -226,7 +227,7 @@ impl<const F: u32> Layers<F> {
     }
 }
 
-/// See [`Layers::same_side`].
+/// See [`Bsdf::same_side`].
 fn same_side(normal: Vec3, wi: Vec3, local_z: f32) -> bool {
     wi.dot(normal) * local_z > 0.0
 }
@@ -234,12 +235,12 @@ fn same_side(normal: Vec3, wi: Vec3, local_z: f32) -> bool {
 /// A closure at a hit, to be evaluated for several directions at once.
 pub struct InLanes<'a, const F: u32> {
     closure: Laned<'a>,
-    layer: &'a Layer,
+    part: &'a WeightedClosure,
     normal: Vec3,
 }
 
 impl<const F: u32> InLanes<'_, F> {
-    /// Eight times [`Layers::sample`], each with the [`Layers::pdf`] of its direction.
+    /// Eight times [`Bsdf::sample`], each with the [`Bsdf::pdf`] of its direction.
     #[must_use]
     #[inline]
     pub fn sample(
@@ -247,7 +248,7 @@ impl<const F: u32> InLanes<'_, F> {
         wo: Vec3,
         rng: &mut impl Draw<f32x8>,
     ) -> [Option<(ScatterSample, f32)>; LANES] {
-        let wo = self.layer.frame.to_local(wo);
+        let wo = self.part.frame.to_local(wo);
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return [None; LANES];
         }
@@ -258,11 +259,11 @@ impl<const F: u32> InLanes<'_, F> {
         };
         exits.map(|exit| {
             let (sample, pdf) = exit.filter(|(sample, _)| sample.is_usable())?;
-            let wi = self.layer.frame.to_world(sample.wi);
+            let wi = self.part.frame.to_world(sample.wi);
             let lit = same_side(self.normal, wi, sample.wi.z);
             let sample = ScatterSample {
                 wi,
-                weight: sample.weight * self.layer.share,
+                weight: sample.weight * self.part.weight,
                 order: sample.order,
                 delta: false,
                 straight: false,
@@ -271,7 +272,7 @@ impl<const F: u32> InLanes<'_, F> {
         })
     }
 
-    /// Estimates of f·|cosθ_i|, sr⁻¹, as [`Layers::eval`] has them, towards each of `wi`.
+    /// Estimates of f·|cosθ_i|, sr⁻¹, as [`Bsdf::eval`] has them, towards each of `wi`.
     #[must_use]
     #[inline]
     pub fn eval(
@@ -280,12 +281,12 @@ impl<const F: u32> InLanes<'_, F> {
         wi: [Vec3; LANES],
         rng: &mut impl Draw<f32x8>,
     ) -> [ByOrder; LANES] {
-        let wo = self.layer.frame.to_local(wo);
+        let wo = self.part.frame.to_local(wo);
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return [ByOrder::ZERO; LANES];
         }
         let local = wi.map(|wi| {
-            let local = self.layer.frame.to_local(wi);
+            let local = self.part.frame.to_local(wi);
             let lit = local.z > MIN_COS && same_side(self.normal, wi, local.z);
             // No light comes from below a metal.
             if lit { local } else { Vec3::NEG_Z }
@@ -297,19 +298,19 @@ impl<const F: u32> InLanes<'_, F> {
             }
             Laned::Beckmann(_) => [ByOrder::ZERO; LANES],
         };
-        values.map(|value| value * Rgb::splat(self.layer.share))
+        values.map(|value| value * self.part.weight)
     }
 }
 
-/// Multiplies what it is given by a layer's share, and hands it on.
+/// Multiplies what it is given by a closure's weight, and hands it on.
 struct Scaled<'a, T> {
-    share: f32,
+    weight: [f32; 3],
     tally: &'a mut T,
 }
 
 impl<T: Tally<f32>> Tally<f32> for Scaled<'_, T> {
     #[inline]
     fn add(&mut self, order: u32, value: model::Rgb<f32>) {
-        self.tally.add(order, value * self.share);
+        self.tally.add(order, value * model::Rgb(self.weight));
     }
 }
