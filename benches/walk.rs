@@ -30,7 +30,7 @@ trait Surface {
     ) -> Rgb<f32>;
 }
 
-impl<N: Ndf<f32>, I: Facets<f32>> Surface for Microsurface<N, I> {
+impl<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>> Surface for Microsurface<N, I> {
     fn sample(&self, wi: Vector3<f32>, rng: &mut Stream<Pcg32>) -> Option<Exit<f32>> {
         Microsurface::sample(self, wi, rng)
     }

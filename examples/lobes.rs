@@ -178,7 +178,7 @@ struct Compared {
 }
 
 impl Compared {
-    fn new<N: Ndf<f64> + Sync, S: Width>(
+    fn new<N: Ndf<Scalar = f64> + Sync, S: Width>(
         normals: (Normals, &'static str),
         (ndf, ndf_of_renderer): (N, S),
         (alpha, cos): (f64, f64),

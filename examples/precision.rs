@@ -83,7 +83,7 @@ const QUANTITIES: [Quantity; 6] = [
 ];
 
 /// The largest error of each quantity over some directions of the same cosine.
-fn cell<S: Ndf<f32>, D: Ndf<f64>>(
+fn cell<S: Ndf<Scalar = f32>, D: Ndf<Scalar = f64>>(
     single: S,
     double: D,
     alpha: f64,
@@ -272,7 +272,7 @@ fn row(name: &str, cells: &[(f64, f64, Option<f64>)]) -> String {
     )
 }
 
-fn maps<S: Ndf<f32>, D: Ndf<f64>>(
+fn maps<S: Ndf<Scalar = f32>, D: Ndf<Scalar = f64>>(
     images: &Path,
     name: &str,
     pair: impl Fn(f32) -> (S, D),

@@ -32,7 +32,9 @@ enum Fault {
 #[derive(Clone, Copy)]
 struct FaultyNdf(Distribution, Fault);
 
-impl Ndf<f64> for FaultyNdf {
+impl Ndf for FaultyNdf {
+    type Scalar = f64;
+
     fn density(&self, m: Vector3<f64>) -> f64 {
         let scale = if self.1 == Fault::Unnormalised {
             1.01
@@ -72,7 +74,9 @@ impl Ndf<f64> for FaultyNdf {
 #[derive(Clone, Copy)]
 struct FaultyGlass(Dielectric<f64>, Fault);
 
-impl Facets<f64> for FaultyGlass {
+impl Facets for FaultyGlass {
+    type Scalar = f64;
+
     const TRANSMITS: bool = true;
     const CLOSED_PHASE: bool = true;
 
@@ -86,7 +90,7 @@ impl Facets<f64> for FaultyGlass {
         self.0.scatter(side, w, m, rng)
     }
 
-    fn phase<N: Ndf<f64>>(
+    fn phase<N: Ndf<Scalar = f64>>(
         &self,
         ndf: &N,
         at: At<f64>,
@@ -147,7 +151,7 @@ impl Model for Faulty {
         Smithwalk.diffuse()
     }
 
-    fn sample<I: Facets<f64>>(
+    fn sample<I: Facets<Scalar = f64>>(
         self,
         surface: &Microsurface<FaultyNdf, I>,
         wi: Vector3<f64>,
@@ -160,7 +164,7 @@ impl Model for Faulty {
         (self.0 != Fault::Cap || exit.order <= 10).then_some(exit)
     }
 
-    fn eval<I: Facets<f64>>(
+    fn eval<I: Facets<Scalar = f64>>(
         self,
         surface: &Microsurface<FaultyNdf, I>,
         estimator: Estimator,
@@ -175,7 +179,7 @@ impl Model for Faulty {
 
 /// A walk that forgets its height, as that of Cycles up to 3.6: an upward ray
 /// that does not escape goes on from C1 = 1, the top.
-fn walk_from_the_top<I: Facets<f64>>(
+fn walk_from_the_top<I: Facets<Scalar = f64>>(
     surface: &Microsurface<FaultyNdf, I>,
     wi: Vector3<f64>,
     rng: &mut impl Draw<f64>,

@@ -97,7 +97,7 @@ impl Albedos {
         table
     }
 
-    fn compute<N: Ndf<f32>>(ndf: fn(f32) -> N, facets: WhiteFacets) -> Self {
+    fn compute<N: Ndf<Scalar = f32>>(ndf: fn(f32) -> N, facets: WhiteFacets) -> Self {
         let white = Rgb([1.0; 3]);
         match facets {
             WhiteFacets::Conductor => {
@@ -159,7 +159,10 @@ struct Grid {
 }
 
 impl Grid {
-    fn measure<N: Ndf<f32>, I: Facets<f32> + Sync>(ndf: fn(f32) -> N, facets: I) -> Self {
+    fn measure<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32> + Sync>(
+        ndf: fn(f32) -> N,
+        facets: I,
+    ) -> Self {
         let row = |i: usize| -> [f32; COSINES] {
             let x = i as f32 / (ROUGHNESSES - 1) as f32 * place(MAX_ROUGHNESS);
             let roughness = x / (1.0 - x);
@@ -204,7 +207,10 @@ fn place(roughness: f32) -> f32 {
 
 /// The share of light that leaves after one facet, at cosine `cos`, by Sobol
 /// points, whose error is below that of interpolation.
-fn single_albedo<N: Ndf<f32>, I: Facets<f32>>(surface: &Microsurface<N, I>, cos: f32) -> f32 {
+fn single_albedo<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>>(
+    surface: &Microsurface<N, I>,
+    cos: f32,
+) -> f32 {
     let wi = Vector3::spherical(cos, 0.0);
     let weight = |index| {
         let mut point = SobolPoint {
@@ -248,7 +254,7 @@ impl Draw<f32> for SobolPoint {
 }
 
 /// How wide a distribution of normals is.
-pub trait Width: Ndf<f32> {
+pub trait Width: Ndf<Scalar = f32> {
     /// The width from which metals are evaluated in lanes.
     const LANES_FROM: f32;
 
@@ -277,7 +283,7 @@ impl Width for Beckmann<f32> {
 }
 
 /// What facets keep of the light.
-pub trait MeanWeight: Facets<f32> {
+pub trait MeanWeight: Facets<Scalar = f32> {
     /// F̄ = 2 ∫ F cosθ d(cosθ): the mean share that one facet does not absorb.
     fn mean_weight(&self) -> Rgb<f32>;
 }

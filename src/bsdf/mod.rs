@@ -15,6 +15,10 @@
 //!   for their own density, which has no closed form: multiple importance
 //!   sampling is unbiased with any such density that both techniques share.
 //!
+//! [`smithwalk_model`] names the directions from the walk's point of view: its
+//! walks begin at ω_i and leave along ω_o. Paths begin at the eye, so `wo` here is
+//! the model's ω_i, and `wi` its ω_o; the cosine in `eval` is that of `wi`.
+//!
 //! What is carried along a path is L/n²: crossing an interface does not scale
 //! it. As long as the eye and the lights are in the same medium that is exact,
 //! and it is how Cycles does it.

@@ -141,7 +141,7 @@ fn walks_with_its_shortcuts_are_those_of_cycles_3_4() {
 }
 
 /// All rows of single scattering of 4.5, isotropic and anisotropic.
-fn single<N: Ndf<f64>>(distribution: &str, ndf: fn(f64, f64) -> N) -> Summary {
+fn single<N: Ndf<Scalar = f64>>(distribution: &str, ndf: fn(f64, f64) -> N) -> Summary {
     const POINTS: u32 = 2048;
     let mut rows: Vec<Metal> = rows("cycles_4.5_albedo_conductor.csv");
     rows.retain(|row| row.distribution == distribution);

@@ -17,7 +17,7 @@ const ORDERS: u32 = 10;
 /// - nor are visible normals those of a tilted view unless it is by 0.8° after
 ///   stretching by α: smooth surfaces are always seen from the normal;
 /// - what is still inside after ten heights is lost.
-pub fn walk<I: Facets<f64>>(
+pub fn walk<I: Facets<Scalar = f64>>(
     surface: &Microsurface<Ggx<f64>, I>,
     wi: Vector3<f64>,
     rng: &mut impl Draw<f64>,
@@ -69,7 +69,7 @@ fn seen_from(ndf: Ggx<f64>, w: Vector3<f64>) -> Vector3<f64> {
 /// One bounce, weighted as Cycles from 4.0 on does: with the masking of
 /// reflection, (1 + Λ_i)/(1 + Λ_i + Λ_o), for refraction too. There the model
 /// has (1 + Λ_i) B(1 + Λ_i, 1 + Λ_o).
-pub fn single<N: Ndf<f64>, I: Facets<f64>>(
+pub fn single<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(
     surface: &Microsurface<N, I>,
     wi: Vector3<f64>,
     rng: &mut impl Draw<f64>,

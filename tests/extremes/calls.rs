@@ -89,7 +89,7 @@ where
 
     /// Asks one surface, through every entry point. `lossless` says that
     /// nothing is absorbed.
-    pub fn ask<N: Ndf<F>, I: Facets<F>>(
+    pub fn ask<N: Ndf<Scalar = F>, I: Facets<Scalar = F>>(
         &self,
         what: &str,
         surface: &Microsurface<N, I>,
@@ -142,7 +142,7 @@ where
         });
     }
 
-    fn judge_sample<N: Ndf<F>, I: Facets<F>>(
+    fn judge_sample<N: Ndf<Scalar = F>, I: Facets<Scalar = F>>(
         &self,
         what: &str,
         surface: &Microsurface<N, I>,
@@ -170,7 +170,7 @@ where
         }
     }
 
-    fn judge_exit<N: Ndf<F>, I: Facets<F>>(
+    fn judge_exit<N: Ndf<Scalar = F>, I: Facets<Scalar = F>>(
         &self,
         what: &str,
         surface: &Microsurface<N, I>,
@@ -201,7 +201,7 @@ where
     }
 
     /// Asks all facets on one distribution of normals.
-    pub fn ask_all<N: Ndf<F>>(&self, name: &str, ndf: N, found: &mut Findings) {
+    pub fn ask_all<N: Ndf<Scalar = F>>(&self, name: &str, ndf: N, found: &mut Findings) {
         let rgb = |v: [f64; 3]| Rgb(v.map(F::of));
         for fresnel in metals() {
             let surface = Microsurface {
@@ -311,7 +311,7 @@ where
         seed,
         |u| u,
         |question, found| {
-            question.ask_all("Quadratic", Quadratic, found);
+            question.ask_all("Quadratic", Quadratic::new(), found);
         },
     );
     let all = ALPHAS.into_par_iter().map(at);

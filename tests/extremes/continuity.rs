@@ -70,7 +70,12 @@ const NEVER: f64 = 1e-20;
 /// σ, Λ and the visible normals along tanθ, from the pole to the horizon,
 /// above and below. `alpha`, the larger roughness, is what rounding of a slope
 /// is stretched by.
-pub fn follow_normals<F: Real, N: Ndf<F>>(name: &str, ndf: N, alpha: f64, found: &mut Findings) {
+pub fn follow_normals<F: Real, N: Ndf<Scalar = F>>(
+    name: &str,
+    ndf: N,
+    alpha: f64,
+    found: &mut Findings,
+) {
     let (one, zero) = (F::one(), F::zero());
     let up = |t: F| Vector3::new(t, zero, one).normalized();
     let down = |t: F| Vector3::new(t, zero, -one).normalized();
@@ -141,7 +146,7 @@ fn follow_all<F: Real>() -> Findings {
         let beckmann = Beckmann { alpha_x, alpha_y };
         follow_normals(&format!("Beckmann {x} {y}"), beckmann, x.max(y), &mut found);
     }
-    follow_normals::<F, _>("Quadratic", Quadratic, 1.0, &mut found);
+    follow_normals::<F, _>("Quadratic", Quadratic::<F>::new(), 1.0, &mut found);
     found
 }
 

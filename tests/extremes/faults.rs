@@ -21,7 +21,9 @@ fn pole<F: Real>(w: Vector3<F>) -> Vector3<F> {
     }
 }
 
-impl<F: Real> Ndf<F> for NormalIncidence<F> {
+impl<F: Real> Ndf for NormalIncidence<F> {
+    type Scalar = F;
+
     fn density(&self, m: Vector3<F>) -> F {
         self.0.density(m)
     }
@@ -43,7 +45,9 @@ struct Textbook<F> {
     clamped: bool,
 }
 
-impl<F: Real> Facets<F> for Textbook<F> {
+impl<F: Real> Facets for Textbook<F> {
+    type Scalar = F;
+
     const TRANSMITS: bool = true;
     const CLOSED_PHASE: bool = true;
 
@@ -80,7 +84,7 @@ impl<F: Real> Facets<F> for Textbook<F> {
         }
     }
 
-    fn phase<N: Ndf<F>>(
+    fn phase<N: Ndf<Scalar = F>>(
         &self,
         ndf: &N,
         at: At<F>,
@@ -107,7 +111,7 @@ impl<F: Real> Facets<F> for Textbook<F> {
 const ALPHAS: [f64; 4] = [0.03, 0.3, 1.0, 8.0];
 
 /// The suite in single precision, over a distribution made from α.
-fn found<N: Ndf<f32>>(ndf: fn(Ggx<f32>) -> N, numbers: fn(f32) -> f32) -> Findings {
+fn found<N: Ndf<Scalar = f32>>(ndf: fn(Ggx<f32>) -> N, numbers: fn(f32) -> f32) -> Findings {
     let mut all = Findings::default();
     for (seed, alpha) in ALPHAS.into_iter().enumerate() {
         let ndf = ndf(Ggx::isotropic(alpha as f32));

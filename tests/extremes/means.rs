@@ -38,7 +38,7 @@ pub fn bound(count: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - 0.5 * each)
 }
 
-fn sampled<N: Ndf<f32>, I: Facets<f32>>(
+fn sampled<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>>(
     surface: &Microsurface<N, I>,
     wi: Vector3<f32>,
     seed: u64,

@@ -45,7 +45,7 @@ fn widened(v: Vector3<f32>) -> Vector3<f64> {
     Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
 }
 
-fn precision<S: Ndf<f32>, D: Ndf<f64>>(name: &str, pairs: &[(S, D)]) {
+fn precision<S: Ndf<Scalar = f32>, D: Ndf<Scalar = f64>>(name: &str, pairs: &[(S, D)]) {
     let (mut sigma, mut lambda, mut density, mut visible) =
         (Worst::new(), Worst::new(), Worst::new(), Worst::new());
     for (k, (single, double)) in pairs.iter().enumerate() {
@@ -130,7 +130,7 @@ fn single_precision_follows_double() {
         })
         .collect();
     precision("Beckmann", &beckmann);
-    precision("quadratic", &[(Quadratic, Quadratic)]);
+    precision("quadratic", &[(Quadratic::new(), Quadratic::new())]);
 
     let mut beta = Worst::new();
     for i in 0..60 {

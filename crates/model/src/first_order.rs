@@ -4,19 +4,15 @@ use super::{
     At, Draw, Exit, Facets, Microsurface, Ndf, Phase, Real, Rgb, Side, Vector3, enters, ln_beta,
 };
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// The first order of f(ω_i, ω_o) |cosθ_o| (sr⁻¹). Exact for conductors
     /// and dielectrics; for diffuse facets an estimate from one normal.
-    pub fn eval_single<F: Real>(
-        &self,
-        wi: Vector3<F>,
-        wo: Vector3<F>,
-        rng: &mut impl Draw<F>,
-    ) -> Rgb<F>
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn eval_single(&self, wi: Vector3<F>, wo: Vector3<F>, rng: &mut impl Draw<F>) -> Rgb<F> {
         if !self.links(wi, wo) {
             return Rgb::black();
         }
@@ -31,11 +27,7 @@ impl<N, I> Microsurface<N, I> {
 
     /// Samples single scattering: the first bounce of a walk, weighted with
     /// the chance that it leaves from there. `None` if it can't.
-    pub fn sample_single<F: Real>(&self, wi: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>>
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn sample_single(&self, wi: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>> {
         if !enters(wi) {
             return None;
         }
@@ -63,10 +55,7 @@ impl<N, I> Microsurface<N, I> {
 
     /// Light from `wi` at its first facet.
     #[inline]
-    pub(super) fn entrance<F: Real>(&self, wi: Vector3<F>) -> At<F>
-    where
-        N: Ndf<F>,
-    {
+    pub(super) fn entrance(&self, wi: Vector3<F>) -> At<F> {
         At {
             side: Side::Above,
             w: wi,
@@ -76,11 +65,7 @@ impl<N, I> Microsurface<N, I> {
 
     /// The first order towards `wo`, with the normal `m` where one is needed.
     #[inline]
-    pub(super) fn first_order<F: Real>(&self, at: At<F>, wo: Vector3<F>, m: Vector3<F>) -> Rgb<F>
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub(super) fn first_order(&self, at: At<F>, wo: Vector3<F>, m: Vector3<F>) -> Rgb<F> {
         let Phase { density, weight } = self.facets.phase(&self.ndf, at, wo, wo.z < F::zero(), m);
         if density > F::zero() {
             weight * (density * self.escape(at, wo))
@@ -96,10 +81,7 @@ impl<N, I> Microsurface<N, I> {
     /// (1 + Λ_i)/(1 + Λ_i + Λ_o). Transmission, where the depth is that of the
     /// other side (Heitz et al. 2016, § 5.2): (1 + Λ_i) B(1 + Λ_i, 1 + Λ_o).
     #[inline]
-    fn escape<F: Real>(&self, at: At<F>, wo: Vector3<F>) -> F
-    where
-        N: Ndf<F>,
-    {
+    fn escape(&self, at: At<F>, wo: Vector3<F>) -> F {
         let cos_i = at.w.z;
         if wo.z > F::zero() {
             return escape_reflected(at, wo.z, self.ndf.projected_area(-wo));

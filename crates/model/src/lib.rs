@@ -7,13 +7,19 @@
 //! It keeps all the energy that single scattering loses, for any roughness.
 //!
 //! A [`Microsurface`] is a distribution of normals ([`Ggx`], [`Beckmann`],
-//! [`Quadratic`]) and what its facets do ([`Conductor`], [`Dielectric`],
-//! [`Diffuse`]), in `f32` or `f64`. It knows nothing of a renderer.
+//! [`Quadratic`], or any other [`Ndf`]) and what its facets do ([`Conductor`],
+//! [`Dielectric`], [`Diffuse`], or any other [`Facets`]), in `f32` or `f64`.
+//! It knows nothing of a renderer.
 //!
 //! # Conventions
 //! - Local frame, z = the macroscopic normal. ω_i and ω_o are unit vectors
 //!   that point away from the surface; ω_i is above it, ω_o below it for
 //!   transmission.
+//! - ω_i is where a walk begins and ω_o where it leaves, as in the paper. A
+//!   path tracer, whose paths begin at the eye, passes its ω_o, towards the
+//!   viewer, as ω_i, and takes the exit as its ω_i, towards the light. Then
+//!   f |cosθ_o| has the cosine at the light, which is what a path's throughput
+//!   multiplies by, and L/n² is carried.
 //! - A BSDF value always includes the cosine, f(ω_i, ω_o) |cosθ_o|, in sr⁻¹.
 //!   Transmission follows the energy: without absorption the integral over
 //!   both hemispheres of ω_o is 1. So a renderer transports L/n², and
@@ -64,10 +70,18 @@ mod walk;
 #[cfg(test)]
 mod tests;
 
+/// Runs the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+// Their traits and types are in the signatures of this crate.
+pub use {num_traits, rand, wide};
+
 pub use draw::{Draw, Stream};
 pub use facets::{At, Bounce, Conductor, Dielectric, Diffuse, Facets, Phase, Side};
 pub use fresnel::ConductorFresnel;
-pub use lanes::{LANES, NdfInLanes};
+pub use lanes::{BeckmannLanes, Directions, GgxLanes, LANES, NdfInLanes, NdfLanes};
 pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};
 pub use real::{Real, ln_beta};
 pub use tally::{PerOrder, Split, Tally, Total};
@@ -119,21 +133,23 @@ const STEEP: f64 = 5.0;
 /// are finite in single precision too.
 const GRAZING: f64 = 1e-30;
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// Estimates f(ω_i, ω_o) |cosθ_o| (sr⁻¹) by `estimator`, giving each
     /// order's share to `tally`. Nothing is given where the value is 0:
     /// outside ω_i,z > 0, or below an opaque surface.
-    pub fn eval<F: Real>(
+    pub fn eval(
         &self,
         estimator: Estimator,
         wi: Vector3<F>,
         wo: Vector3<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         if !self.links(wi, wo) {
             return;
         }
@@ -148,30 +164,20 @@ impl<N, I> Microsurface<N, I> {
 
     /// Whether [`Estimator::PositionFree`] is itself and not a fall-back.
     #[inline]
-    pub fn suits_position_free<F: Real>(&self) -> bool
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn suits_position_free(&self) -> bool {
         I::MIRRORS && self.steep_lambda() < F::of(STEEP)
     }
 
     /// Λ at tanθ = 2, between the axes: a one-number summary of roughness.
     #[inline]
-    fn steep_lambda<F: Real>(&self) -> F
-    where
-        N: Ndf<F>,
-    {
+    fn steep_lambda(&self) -> F {
         let (side, up) = (F::of(0.4f64.sqrt()), F::of(0.2f64.sqrt()));
         self.ndf.lambda(Vector3::new(side, side, up))
     }
 
     /// Whether light can go from `wi` to `wo` other than straight on.
     #[inline]
-    fn links<F: Real>(&self, wi: Vector3<F>, wo: Vector3<F>) -> bool
-    where
-        I: Facets<F>,
-    {
+    fn links(&self, wi: Vector3<F>, wo: Vector3<F>) -> bool {
         let grazing = F::of(GRAZING);
         let leaves = wo.z > grazing || (I::TRANSMITS && wo.z < -grazing);
         enters(wi) && leaves && wo.is_finite() && self.facets.invisible().is_none()

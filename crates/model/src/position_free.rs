@@ -102,7 +102,7 @@ struct End<F> {
 
 impl<F: Real> End<F> {
     #[inline]
-    fn new<N: Ndf<F>>(ndf: &N, w: Vector3<F>) -> Self {
+    fn new<N: Ndf<Scalar = F>>(ndf: &N, w: Vector3<F>) -> Self {
         let [sigma, below] = ndf.projected_areas(w);
         Self { w, sigma, below }
     }
@@ -118,19 +118,21 @@ impl<F: Real> End<F> {
     }
 }
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// Estimates the value by both walks; `wi` and `wo` are known to link,
     /// and the facets to be mirrors.
-    pub(super) fn eval_position_free<F: Real>(
+    pub(super) fn eval_position_free(
         &self,
         wi: Vector3<F>,
         wo: Vector3<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         let ends = [wi, wo].map(|w| End::new(&self.ndf, w));
         tally.add(1, self.first_order(ends[0].at(), wo, wi));
         let mut depth = Depth::new();
@@ -140,7 +142,7 @@ impl<N, I> Microsurface<N, I> {
     }
 
     /// The part of orders ≥ 2 that a walk from `from` finds, times `scale`.
-    fn eval_directions<F: Real>(
+    fn eval_directions(
         &self,
         from: &End<F>,
         to: &End<F>,
@@ -148,10 +150,7 @@ impl<N, I> Microsurface<N, I> {
         depth: &mut Depth<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         let ndf = &self.ndf;
         let lambda = to.below / to.w.z;
         let mut at = from.at();

@@ -7,7 +7,12 @@ use super::{Facets, Microsurface, Ndf, Real, Vector3};
 /// that of the first bounce underflows.
 const LEAST_SHARE: f64 = 1e-3;
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// A density (sr⁻¹, no cosine) that is positive wherever the BSDF is and
     /// integrates to 1 over the directions in which light can leave.
     ///
@@ -18,11 +23,7 @@ impl<N, I> Microsurface<N, I> {
     ///
     /// Weighting two strategies by it is unbiased, as long as both use it;
     /// [`Microsurface::sample`] has a weight of its own.
-    pub fn pdf<F: Real>(&self, wi: Vector3<F>, wo: Vector3<F>) -> F
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn pdf(&self, wi: Vector3<F>, wo: Vector3<F>) -> F {
         if !self.links(wi, wo) {
             return F::zero();
         }
@@ -43,11 +44,7 @@ impl<N, I> Microsurface<N, I> {
     /// facets where it is closed; for diffuse ones [`Microsurface::pdf`]. Its
     /// integral falls short of 1 by the chance that sampling gives `None`
     /// because the light goes on into the surface.
-    pub fn pdf_single<F: Real>(&self, wi: Vector3<F>, wo: Vector3<F>) -> F
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn pdf_single(&self, wi: Vector3<F>, wo: Vector3<F>) -> F {
         if !I::CLOSED_PHASE {
             return self.pdf(wi, wo);
         }
@@ -63,10 +60,7 @@ impl<N, I> Microsurface<N, I> {
     /// A cheap guess of the share of orders ≥ 2: 1 − e^{−x} with x = 3Λ/2, the
     /// exponential by its series, is near that of white GGX mirrors for α ≤ 1.
     #[inline]
-    pub(super) fn multiple_share<F: Real>(&self) -> F
-    where
-        N: Ndf<F>,
-    {
+    pub(super) fn multiple_share(&self) -> F {
         let x = F::of(1.5) * self.steep_lambda();
         let falls = (F::one() + x * (F::one() + F::of(0.5) * x)).recip();
         (F::one() - falls).max(F::of(LEAST_SHARE))

@@ -37,7 +37,7 @@ impl<F: Real> Ray<F> {
     /// [`Ray::advance`], but staying inside more often than the model does;
     /// with the weight that makes up for it.
     #[inline]
-    fn advance_inside<N: Ndf<F>>(&mut self, ndf: &N, u: F) -> Option<(At<F>, F)> {
+    fn advance_inside<N: Ndf<Scalar = F>>(&mut self, ndf: &N, u: F) -> Option<(At<F>, F)> {
         if self.direction.z <= F::zero() {
             return self.advance(ndf, u).map(|at| (at, F::one()));
         }
@@ -62,18 +62,20 @@ impl<F: Real> Ray<F> {
     }
 }
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// Estimates the value by both walks; `wi` and `wo` are known to link.
-    pub(super) fn eval_two_walk<F: Real>(
+    pub(super) fn eval_two_walk(
         &self,
         wi: Vector3<F>,
         wo: Vector3<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         let crosses = wo.z < F::zero();
         let index = if crosses {
             self.facets.relative_index()
@@ -99,7 +101,7 @@ impl<N, I> Microsurface<N, I> {
     /// value towards `to` over that of the reversed path. The walk from ω_o
     /// is `mirrored`, by the factor that turns its value into that of ω_i;
     /// the other also gives the first order, in closed form.
-    fn eval_half<F: Real>(
+    fn eval_half(
         &self,
         from: Vector3<F>,
         to: Vector3<F>,
@@ -107,10 +109,7 @@ impl<N, I> Microsurface<N, I> {
         mirrored: Option<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         let lambda = self.ndf.lambda(if to.z > F::zero() { to } else { -to });
         let mut ray = Ray::entering(from);
         let mut weight = Rgb::splat(mirrored.unwrap_or(F::one()));

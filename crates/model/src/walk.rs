@@ -69,7 +69,7 @@ impl<F: Real> Ray<F> {
     /// The collision rate per unit of τ is σ(−d)/|d_z|, for d going down
     /// (1 + Λ(−d)) and up (Λ(d)).
     #[inline]
-    pub fn advance<N: Ndf<F>>(&mut self, ndf: &N, u: F) -> Option<At<F>> {
+    pub fn advance<N: Ndf<Scalar = F>>(&mut self, ndf: &N, u: F) -> Option<At<F>> {
         let w = -self.direction;
         let sigma = ndf.projected_area(w);
         // |d_z| times an exponential free path; all tests are multiplied
@@ -157,15 +157,16 @@ impl Roulette {
     }
 }
 
-impl<N, I> Microsurface<N, I> {
+impl<F, N, I> Microsurface<N, I>
+where
+    F: Real,
+    N: Ndf<Scalar = F>,
+    I: Facets<Scalar = F>,
+{
     /// One walk that enters from `wi` (unit, z > 0): where it leaves, with
     /// density ∝ f |cosθ_o| if nothing is absorbed. `None` if it was absorbed,
     /// or if `wi` is not above the surface.
-    pub fn sample<F: Real>(&self, wi: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>>
-    where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    pub fn sample(&self, wi: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>> {
         if !enters(wi) {
             return None;
         }
@@ -224,16 +225,13 @@ impl<N, I> Microsurface<N, I> {
 
     /// Estimator 1, the paper's: at every facet the phase function towards
     /// `wo`, times the chance e^{−Λ(ω_o) τ} to get out unhindered.
-    pub(super) fn eval_walk<F: Real>(
+    pub(super) fn eval_walk(
         &self,
         wi: Vector3<F>,
         wo: Vector3<F>,
         rng: &mut impl Draw<F>,
         tally: &mut impl Tally<F>,
-    ) where
-        N: Ndf<F>,
-        I: Facets<F>,
-    {
+    ) {
         let lambda = self.ndf.lambda(if wo.z > F::zero() { wo } else { -wo });
         let mut ray = Ray::entering(wi);
         let mut weight = Rgb::white();

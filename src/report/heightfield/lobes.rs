@@ -174,7 +174,7 @@ impl Setting {
         }
     }
 
-    fn trace<I: Facets<f64>>(
+    fn trace<I: Facets<Scalar = f64>>(
         &self,
         facets: I,
         patch: &Patch,

@@ -134,7 +134,7 @@ impl Patch {
     /// The whole walk of light that comes from `wi` (unit, z > 0) and falls on
     /// the top at `u`; `None` if it got lost to rounding. The facets are those
     /// of the model, the normals those of the mesh.
-    pub fn walk<I: Facets<f64>>(
+    pub fn walk<I: Facets<Scalar = f64>>(
         &self,
         facets: &I,
         wi: Vector3<f64>,

@@ -59,12 +59,14 @@ impl Distribution {
     }
 }
 
-impl Ndf<f64> for Distribution {
+impl Ndf for Distribution {
+    type Scalar = f64;
+
     fn density(&self, m: Vector3<f64>) -> f64 {
         match self {
             Self::Ggx(d) => d.density(m),
             Self::Beckmann(d) => d.density(m),
-            Self::Quadratic => Quadratic.density(m),
+            Self::Quadratic => Quadratic::new().density(m),
         }
     }
 
@@ -72,7 +74,7 @@ impl Ndf<f64> for Distribution {
         match self {
             Self::Ggx(d) => d.projected_area(w),
             Self::Beckmann(d) => d.projected_area(w),
-            Self::Quadratic => Quadratic.projected_area(w),
+            Self::Quadratic => Quadratic::new().projected_area(w),
         }
     }
 
@@ -80,7 +82,7 @@ impl Ndf<f64> for Distribution {
         match self {
             Self::Ggx(d) => d.sample_visible(w, u),
             Self::Beckmann(d) => d.sample_visible(w, u),
-            Self::Quadratic => Quadratic.sample_visible(w, u),
+            Self::Quadratic => Quadratic::new().sample_visible(w, u),
         }
     }
 }
@@ -89,13 +91,13 @@ impl Ndf<f64> for Distribution {
 /// tests give others, with a part that is wrong, to see it found.
 pub trait Model: Copy + Send + Sync {
     /// Its distributions of normals.
-    type Ndf: Ndf<f64> + Send + Sync;
+    type Ndf: Ndf<Scalar = f64> + Send + Sync;
     /// Its mirrors.
-    type Conductor: Facets<f64> + Send + Sync;
+    type Conductor: Facets<Scalar = f64> + Send + Sync;
     /// Its dielectric facets.
-    type Dielectric: Facets<f64> + Send + Sync;
+    type Dielectric: Facets<Scalar = f64> + Send + Sync;
     /// Its Lambertian facets.
-    type Diffuse: Facets<f64> + Send + Sync;
+    type Diffuse: Facets<Scalar = f64> + Send + Sync;
 
     /// The distribution `d`.
     fn ndf(self, d: Distribution) -> Self::Ndf;
@@ -110,7 +112,7 @@ pub trait Model: Copy + Send + Sync {
     fn diffuse(self) -> Self::Diffuse;
 
     /// One walk, as [`Microsurface::sample`].
-    fn sample<I: Facets<f64>>(
+    fn sample<I: Facets<Scalar = f64>>(
         self,
         surface: &Microsurface<Self::Ndf, I>,
         wi: Vector3<f64>,
@@ -120,7 +122,7 @@ pub trait Model: Copy + Send + Sync {
     }
 
     /// One estimate, as [`Microsurface::eval`].
-    fn eval<I: Facets<f64>>(
+    fn eval<I: Facets<Scalar = f64>>(
         self,
         surface: &Microsurface<Self::Ndf, I>,
         estimator: Estimator,

@@ -35,7 +35,7 @@ pub struct OrderRow {
     pub walks: u32,
 }
 
-fn row<M: Model, I: Facets<f64>>(
+fn row<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     (facets, name): (I, &'static str),
     alpha: f64,
@@ -114,7 +114,7 @@ pub fn lobes<M: Model>(model: M, effort: Effort) -> Result<Vec<String>, PlotErro
     ])
 }
 
-fn lobe<M: Model, I: Facets<f64> + Sync>(
+fn lobe<M: Model, I: Facets<Scalar = f64> + Sync>(
     model: M,
     facets: I,
     name: &str,

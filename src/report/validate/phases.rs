@@ -69,7 +69,7 @@ fn spread(
 }
 
 /// Where light comes from, in the model's terms.
-fn at<N: Ndf<f64>>(ndf: &N, side: Side, w: Vector3<f64>) -> At<f64> {
+fn at<N: Ndf<Scalar = f64>>(ndf: &N, side: Side, w: Vector3<f64>) -> At<f64> {
     At {
         side,
         w,
@@ -79,7 +79,7 @@ fn at<N: Ndf<f64>>(ndf: &N, side: Side, w: Vector3<f64>) -> At<f64> {
 
 /// The density of normals that the phase function implies: its value where a
 /// normal sends the light, times dω/dm. Reflection and transmission.
-fn implied<N: Ndf<f64>, I: Facets<f64>>(
+fn implied<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(
     ndf: &N,
     facets: &I,
     at: At<f64>,
@@ -123,7 +123,7 @@ struct Setting<N, I> {
     index: usize,
 }
 
-impl<N: Ndf<f64>, I> Setting<N, I> {
+impl<N: Ndf<Scalar = f64>, I> Setting<N, I> {
     fn origin(&self) -> At<f64> {
         at(&self.ndf, self.side, self.w)
     }
@@ -131,7 +131,7 @@ impl<N: Ndf<f64>, I> Setting<N, I> {
 
 /// What is done with facets of all kinds.
 trait Visit {
-    fn visit<N: Ndf<f64>, I: Facets<f64>>(&self, at: &Setting<N, I>) -> Case;
+    fn visit<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(&self, at: &Setting<N, I>) -> Case;
 }
 
 /// Mirrors, and dielectrics of all indices from either side.
@@ -172,7 +172,7 @@ fn visit_all<M: Model>(model: M, effort: Effort, visitor: &(impl Visit + Sync)) 
 struct Integral;
 
 impl Visit for Integral {
-    fn visit<N: Ndf<f64>, I: Facets<f64>>(&self, at: &Setting<N, I>) -> Case {
+    fn visit<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(&self, at: &Setting<N, I>) -> Case {
         let from = at.origin();
         let sum = Slopes::seen(at.d, at.w).integrate(NODES, |m| {
             let [r, t] = implied(&at.ndf, &at.facets, from, at.eta, m);
@@ -188,7 +188,7 @@ struct Scattering {
 }
 
 impl Visit for Scattering {
-    fn visit<N: Ndf<f64>, I: Facets<f64>>(&self, at: &Setting<N, I>) -> Case {
+    fn visit<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(&self, at: &Setting<N, I>) -> Case {
         let (from, slopes) = (at.origin(), Slopes::seen(at.d, at.w));
         let mut expected = Vec::new();
         for part in 0..2 {
@@ -365,7 +365,7 @@ pub fn normalised<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotE
 }
 
 /// A direction off a facet seen from `w`, so that narrow lobes are met.
-fn partner<N: Ndf<f64>>(
+fn partner<N: Ndf<Scalar = f64>>(
     ndf: &N,
     w: Vector3<f64>,
     eta: Option<f64>,

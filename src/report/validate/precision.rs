@@ -33,7 +33,7 @@ fn widened(v: Vector3<f32>) -> Vector3<f64> {
 }
 
 /// Compares both precisions at the same, representable, direction.
-fn rows<N: Ndf<f32>, M: Ndf<f64>>(
+fn rows<N: Ndf<Scalar = f32>, M: Ndf<Scalar = f64>>(
     d: Distribution,
     single: N,
     double: M,
@@ -134,7 +134,7 @@ pub fn table(effort: Effort) -> Vec<PrecisionRow> {
             };
             rows(d, Beckmann { alpha_x, alpha_y }, double, &views)
         }
-        Distribution::Quadratic => rows(d, Quadratic, Quadratic, &views),
+        Distribution::Quadratic => rows(d, Quadratic::new(), Quadratic::new(), &views),
     });
     rows.collect()
 }

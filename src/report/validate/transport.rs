@@ -19,7 +19,7 @@ const LEAST_BEND: f64 = 0.3;
 /// Whether the walk's estimates for fixed directions have tails light enough
 /// for normal scores: its connections are as high as the lobe of a facet, which
 /// refraction makes narrower.
-fn wide<I: Facets<f64>>(d: Distribution, _: &I, bend: f64) -> bool {
+fn wide<I: Facets<Scalar = f64>>(d: Distribution, _: &I, bend: f64) -> bool {
     let least = if I::TRANSMITS { 1.0 } else { 0.5 };
     d.alpha().0.min(d.alpha().1) >= least && bend >= LEAST_BEND
 }
@@ -47,7 +47,7 @@ macro_rules! each_facets {
 }
 
 /// The estimators that `facets` have.
-fn estimators<I: Facets<f64>>() -> &'static [Estimator] {
+fn estimators<I: Facets<Scalar = f64>>() -> &'static [Estimator] {
     if I::MIRRORS {
         &[Estimator::Walk, Estimator::TwoWalk, Estimator::PositionFree]
     } else {
@@ -58,7 +58,7 @@ fn estimators<I: Facets<f64>>() -> &'static [Estimator] {
 /// Whether an integral of evaluations has tails light enough for normal scores
 /// with [`Proposal`]: either higher orders have wide lobes, or there are hardly
 /// any. What walks carry out is tested everywhere.
-fn tame<I: Facets<f64>>(d: Distribution, w: Vector3<f64>, _: &I, bend: f64) -> bool {
+fn tame<I: Facets<Scalar = f64>>(d: Distribution, w: Vector3<f64>, _: &I, bend: f64) -> bool {
     let (x, y) = d.alpha();
     let tan = (1.0 - w.z * w.z).max(0.0).sqrt() / w.z;
     let least = if I::TRANSMITS { 0.5 } else { 0.2 };
@@ -73,7 +73,7 @@ struct Proposal<N, I> {
     rougher: Microsurface<N, I>,
 }
 
-impl<N: Ndf<f64>, I: Facets<f64>> Proposal<N, I> {
+impl<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>> Proposal<N, I> {
     fn new<M: Model<Ndf = N>>(model: M, d: Distribution, facets: I) -> Self {
         let (x, y) = d.alpha();
         let rougher = Distribution::Ggx(Ggx {
@@ -120,7 +120,7 @@ impl<N: Ndf<f64>, I: Facets<f64>> Proposal<N, I> {
 }
 
 /// ∫ f |cosθ_o| dω_o by an estimator: single scattering, and all.
-fn albedo<M: Model, I: Facets<f64>>(
+fn albedo<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     proposal: &Proposal<M::Ndf, I>,
     estimator: Estimator,
@@ -159,7 +159,7 @@ impl Tally<f64> for ByOrder {
 
 /// What walks carry out in zones of the sphere by order, against what is
 /// evaluated in them.
-fn zones<M: Model, I: Facets<f64>>(
+fn zones<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     proposal: &Proposal<M::Ndf, I>,
     name: &str,
@@ -297,12 +297,12 @@ pub fn white_furnace<M: Model>(model: M, effort: Effort) -> Result<Statement, Pl
 }
 
 /// [`estimators`] of a value.
-fn estimators_of<I: Facets<f64>>(_: &I) -> &'static [Estimator] {
+fn estimators_of<I: Facets<Scalar = f64>>(_: &I) -> &'static [Estimator] {
     estimators::<I>()
 }
 
 /// f |cosθ_o| by an estimator.
-fn value<M: Model, I: Facets<f64>>(
+fn value<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     surface: &Microsurface<M::Ndf, I>,
     estimator: Estimator,
@@ -329,7 +329,7 @@ fn cell(w: Vector3<f64>) -> usize {
 
 /// Walks that enter evenly (∝ cosθ): how many go from each cell of the upper
 /// hemisphere to each one of the upper and of the lower.
-fn flows<M: Model, I: Facets<f64>>(
+fn flows<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     surface: &Microsurface<M::Ndf, I>,
     samples: usize,
@@ -349,7 +349,7 @@ fn flows<M: Model, I: Facets<f64>>(
 
 /// Detailed balance: as many walks from cell a to b as from b to a; across the
 /// surface n² as many.
-fn balance<M: Model, I: Facets<f64>>(
+fn balance<M: Model, I: Facets<Scalar = f64>>(
     model: M,
     d: Distribution,
     facets: (I, I, f64),
@@ -534,7 +534,7 @@ pub fn reciprocal<M: Model>(model: M, effort: Effort) -> Result<Statement, PlotE
     })
 }
 
-fn transmits<I: Facets<f64>>(_: &I) -> bool {
+fn transmits<I: Facets<Scalar = f64>>(_: &I) -> bool {
     I::TRANSMITS
 }
 

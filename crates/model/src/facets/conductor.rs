@@ -11,7 +11,9 @@ pub struct Conductor<F> {
     pub fresnel: ConductorFresnel<F>,
 }
 
-impl<F: Real> Facets<F> for Conductor<F> {
+impl<F: Real> Facets for Conductor<F> {
+    type Scalar = F;
+
     const TRANSMITS: bool = false;
     const CLOSED_PHASE: bool = true;
     const MIRRORS: bool = true;
@@ -27,7 +29,7 @@ impl<F: Real> Facets<F> for Conductor<F> {
     }
 
     #[inline]
-    fn phase<N: Ndf<F>>(
+    fn phase<N: Ndf<Scalar = F>>(
         &self,
         ndf: &N,
         at: At<F>,

@@ -28,7 +28,9 @@ impl<F: Real> Dielectric<F> {
     }
 }
 
-impl<F: Real> Facets<F> for Dielectric<F> {
+impl<F: Real> Facets for Dielectric<F> {
+    type Scalar = F;
+
     const TRANSMITS: bool = true;
     const CLOSED_PHASE: bool = true;
 
@@ -57,7 +59,7 @@ impl<F: Real> Facets<F> for Dielectric<F> {
     }
 
     #[inline]
-    fn phase<N: Ndf<F>>(
+    fn phase<N: Ndf<Scalar = F>>(
         &self,
         ndf: &N,
         at: At<F>,

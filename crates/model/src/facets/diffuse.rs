@@ -10,7 +10,9 @@ pub struct Diffuse<F> {
     pub albedo: Rgb<F>,
 }
 
-impl<F: Real> Facets<F> for Diffuse<F> {
+impl<F: Real> Facets for Diffuse<F> {
+    type Scalar = F;
+
     const TRANSMITS: bool = false;
     const CLOSED_PHASE: bool = false;
 
@@ -24,7 +26,7 @@ impl<F: Real> Facets<F> for Diffuse<F> {
     }
 
     #[inline]
-    fn phase<N: Ndf<F>>(
+    fn phase<N: Ndf<Scalar = F>>(
         &self,
         _: &N,
         _: At<F>,

@@ -8,6 +8,8 @@ pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
 
+use num_traits::One;
+
 use super::{Draw, Ndf, Real, Rgb, Vector3};
 
 /// The side of the macroscopic surface that a walk is on. A walk's frame
@@ -65,7 +67,10 @@ impl<F: Real> Phase<F> {
 
 /// The interaction of light with the micro-facets, which the distribution of
 /// their normals turns into the phase function of the microsurface.
-pub trait Facets<F: Real>: Copy {
+pub trait Facets: Copy {
+    /// What it is computed in, `f32` or `f64`.
+    type Scalar: Real;
+
     /// Whether light can come out on the other side.
     const TRANSMITS: bool;
 
@@ -82,37 +87,37 @@ pub trait Facets<F: Real>: Copy {
     fn scatter(
         &self,
         side: Side,
-        w: Vector3<F>,
-        m: Vector3<F>,
-        rng: &mut impl Draw<F>,
-    ) -> Bounce<F>;
+        w: Vector3<Self::Scalar>,
+        m: Vector3<Self::Scalar>,
+        rng: &mut impl Draw<Self::Scalar>,
+    ) -> Bounce<Self::Scalar>;
 
     /// The phase function p(−w → o) for light that comes from `w`, with
     /// `sigma` = σ(w). `o` is in the frame of `side`; `crosses` picks the
     /// transmitted part. `m` is a normal sampled from the visible ones of
     /// `w`, for facets whose phase function is not closed.
-    fn phase<N: Ndf<F>>(
+    fn phase<N: Ndf<Scalar = Self::Scalar>>(
         &self,
         ndf: &N,
-        at: At<F>,
-        o: Vector3<F>,
+        at: At<Self::Scalar>,
+        o: Vector3<Self::Scalar>,
         crosses: bool,
-        m: Vector3<F>,
-    ) -> Phase<F>;
+        m: Vector3<Self::Scalar>,
+    ) -> Phase<Self::Scalar>;
 
     /// These facets seen from the other side.
     fn inverted(&self) -> Self;
 
     /// n(below) / n(above).
     #[inline]
-    fn relative_index(&self) -> F {
-        F::one()
+    fn relative_index(&self) -> Self::Scalar {
+        Self::Scalar::one()
     }
 
     /// The colour of what goes straight on, where the surface is none: a
     /// dielectric as dense as its surroundings.
     #[inline]
-    fn invisible(&self) -> Option<Rgb<F>> {
+    fn invisible(&self) -> Option<Rgb<Self::Scalar>> {
         None
     }
 }

@@ -9,12 +9,16 @@ use crate::{ConductorFresnel, Rgb, Vector3};
 /// A direction in each lane.
 #[derive(Clone, Copy)]
 pub struct Directions {
+    /// Along the tangent.
     pub x: f32x8,
+    /// Along the bitangent.
     pub y: f32x8,
+    /// Along the macroscopic normal.
     pub z: f32x8,
 }
 
 impl Directions {
+    /// The same direction in all lanes.
     #[inline(always)]
     pub fn splat(v: Vector3<f32>) -> Self {
         Self {
@@ -24,6 +28,7 @@ impl Directions {
         }
     }
 
+    /// A direction for each lane.
     #[inline(always)]
     pub fn of(v: &[Vector3<f32>; 8]) -> Self {
         Self {
@@ -33,11 +38,13 @@ impl Directions {
         }
     }
 
+    /// Scalar products.
     #[inline(always)]
     pub fn dot(self, o: Self) -> f32x8 {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
+    /// Each times the number of its lane.
     #[inline(always)]
     pub fn scaled(self, s: f32x8) -> Self {
         Self {
@@ -47,6 +54,7 @@ impl Directions {
         }
     }
 
+    /// Sums.
     #[inline(always)]
     pub fn plus(self, o: Self) -> Self {
         Self {
@@ -56,6 +64,7 @@ impl Directions {
         }
     }
 
+    /// The opposite directions.
     #[inline(always)]
     pub fn reversed(self) -> Self {
         self.scaled(f32x8::from(-1.0))

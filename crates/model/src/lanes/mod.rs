@@ -9,14 +9,12 @@ mod ndf;
 mod rotated;
 mod sample;
 
-pub use ndf::NdfInLanes;
+pub use beckmann::BeckmannLanes;
+pub use math::Directions;
+pub use ndf::{GgxLanes, NdfInLanes, NdfLanes};
 
 #[cfg(test)]
-pub(super) use {
-    beckmann::{erf_inv_of_twice_less_one, ierfc},
-    math::Directions,
-    ndf::NdfLanes,
-};
+pub(super) use beckmann::{erf_inv_of_twice_less_one, ierfc};
 
 use wide::{CmpEq, CmpGt, CmpLt, f32x8};
 

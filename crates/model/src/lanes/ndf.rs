@@ -6,7 +6,7 @@ use super::math::Directions;
 use crate::{Ggx, Ndf};
 
 /// A distribution that can be evaluated and sampled in lanes.
-pub trait NdfInLanes: Ndf<f32> {
+pub trait NdfInLanes: Ndf<Scalar = f32> {
     /// It, the same in all lanes.
     type Lanes: NdfLanes;
 

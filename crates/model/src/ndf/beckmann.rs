@@ -25,7 +25,9 @@ impl<F: Real> Beckmann<F> {
     }
 }
 
-impl<F: Real> Ndf<F> for Beckmann<F> {
+impl<F: Real> Ndf for Beckmann<F> {
+    type Scalar = F;
+
     #[inline]
     fn density(&self, m: Vector3<F>) -> F {
         if m.z <= F::zero() {

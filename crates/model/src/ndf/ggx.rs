@@ -26,7 +26,9 @@ impl<F: Real> Ggx<F> {
     }
 }
 
-impl<F: Real> Ndf<F> for Ggx<F> {
+impl<F: Real> Ndf for Ggx<F> {
+    type Scalar = F;
+
     #[inline]
     fn density(&self, m: Vector3<F>) -> F {
         if m.z <= F::zero() {

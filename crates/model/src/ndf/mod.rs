@@ -8,6 +8,8 @@ pub use beckmann::Beckmann;
 pub use ggx::Ggx;
 pub use quadratic::Quadratic;
 
+use num_traits::{Float, Zero};
+
 use super::{Real, Vector3};
 
 /// A distribution of micro-normals D(m) on the upper hemisphere, normalised
@@ -15,20 +17,23 @@ use super::{Real, Vector3};
 ///
 /// Every function of a direction `w` holds on the whole sphere: rays inside
 /// the microsurface also go up, and then see it from below.
-pub trait Ndf<F: Real>: Copy {
+pub trait Ndf: Copy {
+    /// What it is computed in, `f32` or `f64`.
+    type Scalar: Real;
+
     /// D(m), sr⁻¹: the area of micro-facets with normal around m per unit of
     /// macroscopic area and solid angle. 0 for m_z ≤ 0.
-    fn density(&self, m: Vector3<F>) -> F;
+    fn density(&self, m: Vector3<Self::Scalar>) -> Self::Scalar;
 
     /// σ(w) = ∫ ⟨m·w⟩ D(m) dm: the area of all micro-facets that face w,
     /// projected along w, per unit of macroscopic area. σ(w) − σ(−w) = w_z.
-    fn projected_area(&self, w: Vector3<F>) -> F;
+    fn projected_area(&self, w: Vector3<Self::Scalar>) -> Self::Scalar;
 
     /// σ(w) and σ(−w), for little more than one of them. Adding up what lies
     /// below the horizon and w_z loses no digits.
     #[inline]
-    fn projected_areas(&self, w: Vector3<F>) -> [F; 2] {
-        if w.z >= F::zero() {
+    fn projected_areas(&self, w: Vector3<Self::Scalar>) -> [Self::Scalar; 2] {
+        if w.z >= Self::Scalar::zero() {
             let below = self.projected_area(-w);
             [below + w.z, below]
         } else {
@@ -39,22 +44,22 @@ pub trait Ndf<F: Real>: Copy {
 
     /// Smith's Λ(w) = σ(−w) / w_z, for w_z ≥ 0 (∞ at w_z = 0).
     #[inline]
-    fn lambda(&self, w: Vector3<F>) -> F {
+    fn lambda(&self, w: Vector3<Self::Scalar>) -> Self::Scalar {
         self.projected_area(-w) / w.z
     }
 
     /// Smith's masking G1(w) = 1 / (1 + Λ(w)) = w_z / σ(w), for w_z ≥ 0.
     #[inline]
-    fn masking(&self, w: Vector3<F>) -> F {
+    fn masking(&self, w: Vector3<Self::Scalar>) -> Self::Scalar {
         w.z / self.projected_area(w)
     }
 
     /// D_w(m) = ⟨m·w⟩ D(m) / σ(w), sr⁻¹: the density of normals seen from w.
     #[inline]
-    fn visible_density(&self, w: Vector3<F>, m: Vector3<F>) -> F {
-        let facing = w.dot(m).max(F::zero());
-        if facing == F::zero() {
-            F::zero()
+    fn visible_density(&self, w: Vector3<Self::Scalar>, m: Vector3<Self::Scalar>) -> Self::Scalar {
+        let facing = w.dot(m).max(Self::Scalar::zero());
+        if facing == Self::Scalar::zero() {
+            Self::Scalar::zero()
         } else {
             facing * self.density(m) / self.projected_area(w)
         }
@@ -63,7 +68,11 @@ pub trait Ndf<F: Real>: Copy {
     /// A unit normal with density [`Ndf::visible_density`], from two uniform
     /// numbers in [0, 1); continuous in both. Seen from straight below
     /// (w = −z, where σ = 0) it is the limit, a horizontal normal.
-    fn sample_visible(&self, w: Vector3<F>, u: [F; 2]) -> Vector3<F>;
+    fn sample_visible(
+        &self,
+        w: Vector3<Self::Scalar>,
+        u: [Self::Scalar; 2],
+    ) -> Vector3<Self::Scalar>;
 }
 
 /// √(x² + y²). Where the squares underflow, so does what it is needed for.

@@ -1,3 +1,5 @@
+use std::marker::PhantomData;
+
 use super::{Ndf, Real, Vector3, length, rotate_to_azimuth};
 
 /// D(m) = (2/π) m_z² on the hemisphere: the distribution whose Smith mirror
@@ -6,18 +8,24 @@ use super::{Ndf, Real, Vector3, length, rotate_to_azimuth};
 ///
 /// σ(w) = (1 + w_z)²/4.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Quadratic;
+pub struct Quadratic<F>(PhantomData<F>);
 
-impl Quadratic {
+impl<F: Real> Quadratic<F> {
+    /// The one there is.
+    #[inline]
+    pub fn new() -> Self {
+        Self(PhantomData)
+    }
+
     /// f(ω_i, ω_o) cosθ_o of its perfect mirror, all orders, sr⁻¹:
     /// f = (cosθ_i + cosθ_o) / (π (1 + ω_i·ω_o)).
-    pub fn mirror_all_orders<F: Real>(wi: Vector3<F>, wo: Vector3<F>) -> F {
+    pub fn mirror_all_orders(wi: Vector3<F>, wo: Vector3<F>) -> F {
         wo.z * (wi.z + wo.z) / (F::PI() * (F::one() + wi.dot(wo)))
     }
 
     /// First order of the same, sr⁻¹, cosine included:
     /// the whole divided by 1 + cosθ_i cosθ_o.
-    pub fn mirror_first_order<F: Real>(wi: Vector3<F>, wo: Vector3<F>) -> F {
+    pub fn mirror_first_order(wi: Vector3<F>, wo: Vector3<F>) -> F {
         Self::mirror_all_orders(wi, wo) / (F::one() + wi.z * wo.z)
     }
 }
@@ -32,7 +40,9 @@ fn one_plus_z<F: Real>(w: Vector3<F>) -> F {
     }
 }
 
-impl<F: Real> Ndf<F> for Quadratic {
+impl<F: Real> Ndf for Quadratic<F> {
+    type Scalar = F;
+
     #[inline]
     fn density(&self, m: Vector3<F>) -> F {
         if m.z <= F::zero() {

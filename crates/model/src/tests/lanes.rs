@@ -35,7 +35,7 @@ impl Draw<f32x8> for Eight {
 }
 
 /// A distribution in double precision, with its counterpart in lanes.
-trait Paired: Ndf<f64> + Debug {
+trait Paired: Ndf<Scalar = f64> + Debug {
     type Single: NdfInLanes + Debug;
 
     /// The relative error that the first order may have.

@@ -181,12 +181,14 @@ impl Case {
     }
 }
 
-impl Ndf<f64> for Case {
+impl Ndf for Case {
+    type Scalar = f64;
+
     fn density(&self, m: Vector3<f64>) -> f64 {
         match self {
             Self::Ggx(d) => d.density(m),
             Self::Beckmann(d) => d.density(m),
-            Self::Quadratic => Quadratic.density(m),
+            Self::Quadratic => Quadratic::new().density(m),
         }
     }
 
@@ -194,7 +196,7 @@ impl Ndf<f64> for Case {
         match self {
             Self::Ggx(d) => d.projected_area(w),
             Self::Beckmann(d) => d.projected_area(w),
-            Self::Quadratic => Quadratic.projected_area(w),
+            Self::Quadratic => Quadratic::new().projected_area(w),
         }
     }
 
@@ -202,7 +204,7 @@ impl Ndf<f64> for Case {
         match self {
             Self::Ggx(d) => d.sample_visible(w, u),
             Self::Beckmann(d) => d.sample_visible(w, u),
-            Self::Quadratic => Quadratic.sample_visible(w, u),
+            Self::Quadratic => Quadratic::new().sample_visible(w, u),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::*;
 
 /// f(ω_i, ω_o) cosθ_o in the first channel, all orders.
-fn estimate<N: Ndf<f64>, I: Facets<f64>>(
+fn estimate<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(
     surface: &Microsurface<N, I>,
     estimator: Estimator,
     wi: Vector3<f64>,
@@ -22,7 +22,7 @@ fn estimate<N: Ndf<f64>, I: Facets<f64>>(
 
 /// A direction out of a mixture of the uniform one and the proxy density, and
 /// its density.
-fn pick_direction<N: Ndf<f64>, I: Facets<f64>>(
+fn pick_direction<N: Ndf<Scalar = f64>, I: Facets<Scalar = f64>>(
     surface: &Microsurface<N, I>,
     wi: Vector3<f64>,
     rng: &mut Stream<Pcg64Mcg>,
@@ -46,7 +46,7 @@ fn pick_direction<N: Ndf<f64>, I: Facets<f64>>(
 }
 
 /// Statement 6, white furnace: ∫ f cosθ_o dω_o = 1.
-fn furnace<I: Facets<f64>>(name: &str, facets: I, estimator: Estimator, cases: &[Case]) {
+fn furnace<I: Facets<Scalar = f64>>(name: &str, facets: I, estimator: Estimator, cases: &[Case]) {
     let cosines = [1.0, 0.7, 0.2, 0.02];
     let bound = worst_score(cases.len() * cosines.len());
     let mut rng = stream(11);
@@ -94,7 +94,7 @@ fn walks_keep_the_energy() {
 /// orders and first.
 fn closed_form(estimator: Estimator, pairs: usize, samples: usize) {
     let surface = Microsurface {
-        ndf: Quadratic,
+        ndf: Quadratic::new(),
         facets: mirror(1.0),
     };
     let bound = worst_score(pairs);
@@ -125,7 +125,7 @@ fn the_walk_meets_the_closed_form() {
 #[ignore = "takes an hour"]
 fn two_walks_meet_the_closed_form_to_three_digits() {
     let surface = Microsurface {
-        ndf: Quadratic,
+        ndf: Quadratic::new(),
         facets: mirror(1.0),
     };
     let pairs = 500;
@@ -169,7 +169,7 @@ fn two_walks_meet_the_closed_form() {
 }
 
 /// Order by order the other estimators have the walk's mean.
-fn estimators_agree<I: Facets<f64>>(name: &str, facets: I, estimator: Estimator) {
+fn estimators_agree<I: Facets<Scalar = f64>>(name: &str, facets: I, estimator: Estimator) {
     const ORDERS: usize = 4;
     let mut pairs = vec![(0.9, 0.3), (0.3, 0.9), (0.15, 0.5), (0.6, 0.6)];
     if I::TRANSMITS {
@@ -333,7 +333,7 @@ fn walks_are_reciprocal() {
 
 /// Statements 3 and 8: order 1 of a walk is the closed single scattering,
 /// connected (eval) and as it leaves (sample).
-fn single_scattering<I: Facets<f64>>(name: &str, facets: I) {
+fn single_scattering<I: Facets<Scalar = f64>>(name: &str, facets: I) {
     let cosines = [0.95, 0.4, 0.08];
     let cases = Case::all();
     let bound = worst_score(cases.len() * cosines.len() * 2);
@@ -392,7 +392,7 @@ fn first_order_is_single_scattering() {
 
 /// What leaves in a solid angle is the integral of what is evaluated there,
 /// order by order: eval against sample.
-fn exits_follow_the_evaluation<I: Facets<f64>>(name: &str, facets: I) {
+fn exits_follow_the_evaluation<I: Facets<Scalar = f64>>(name: &str, facets: I) {
     let cases = Case::wide();
     let zones = [(-1.0, -0.5), (-0.5, 0.0), (0.0, 0.4), (0.4, 1.0)];
     let bound = worst_score(cases.len() * zones.len() * 2);
