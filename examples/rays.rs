@@ -18,7 +18,8 @@ use anyhow::{Context, Result, ensure};
 use cpu_time::ThreadTime;
 use smithwalk::description::Description;
 use smithwalk::embree::{Accelerator, Query, Ray, recorded};
-use smithwalk::film::{AovSet, Film, PixelFilter, Window};
+use smithwalk::film::{AovSet, Film, PixelFilter};
+use smithwalk::image::Window;
 use smithwalk::integrator::{Limits, RenderReport, RenderRequest, render};
 use smithwalk::scene::{Scene, resolve};
 

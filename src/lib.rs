@@ -20,6 +20,7 @@ pub mod description;
 pub mod embree;
 pub mod features;
 pub mod film;
+pub mod image;
 pub mod integrator;
 pub mod light;
 pub mod mesh;

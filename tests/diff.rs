@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use smithwalk::film::{Image, Layer, OutputPath, Window, read_exr};
+use smithwalk::image::{Image, Layer, OutputPath, Window, read_exr};
 
 const FLOAT: &str = "tests/data/blender-float.exr";
 const HALF: &str = "tests/data/blender-half.exr";

@@ -5,7 +5,7 @@
 
 use crate::common::{Settings, image};
 use exr::prelude::write_rgb_file;
-use smithwalk::film::Image;
+use smithwalk::image::Image;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use smithwalk::film::{
-    Aov, AovSet, Film, OutputError, OutputPath, ResumeError, Sample, Window, read_exr, sidecar_path,
-};
+use smithwalk::film::{Aov, AovSet, Film, ResumeError, Sample, sidecar_path};
+use smithwalk::image::{OutputError, OutputPath, Window, read_exr};
 use smithwalk::sampler::{Dimension, Sampler};
 
 /// A folder of its own for each test, removed at the end.

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{Settings, image};
-use smithwalk::film::{Image, read_exr};
+use smithwalk::image::{Image, read_exr};
 
 /// Pixels on a side of the blocks that are compared: enough to average noise
 /// away, few enough that a mirrored or shifted image stands out.

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::common::{Settings, film, image, load};
-use smithwalk::film::{Aov, Window, read_exr};
+use smithwalk::film::Aov;
+use smithwalk::image::{Window, read_exr};
 use smithwalk::integrator::{KERNELS, kernel_for};
 use smithwalk::metrics::{mean, rel_bias, rel_bias_trimmed};
 

@@ -7,7 +7,8 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde_json::json;
-use smithwalk::film::{PixelFilter, read_exr};
+use smithwalk::film::PixelFilter;
+use smithwalk::image::read_exr;
 use smithwalk::report::converge::{
     Abscissa, Curve, Fit, Plan, Reach, Reference, Run, View, chart, measure, read_peers,
 };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use smithwalk::film::{OutputPath, read_exr};
+use smithwalk::image::{OutputPath, read_exr};
 use smithwalk::metrics::{
     Comparison, DifferenceMap, FALSE_ALARM_RATE, OUTLIER, Outliers, Pair, ZTest,
 };

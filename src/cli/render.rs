@@ -11,7 +11,8 @@ use anyhow::{Context, bail, ensure};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use smithwalk::description::{Aov as AovName, Description, Estimator, Filter};
 use smithwalk::features::Features;
-use smithwalk::film::{Aov, AovSet, Film, OutputPath, PixelFilter, Window, sidecar_path};
+use smithwalk::film::{Aov, AovSet, Film, PixelFilter, sidecar_path};
+use smithwalk::image::{OutputPath, Window};
 use smithwalk::integrator::{Limits, Progress, RenderReport, RenderRequest, Stop, begun, render};
 use smithwalk::scene::Scene;
 

@@ -1,4 +1,4 @@
-//! From samples to image files.
+//! From samples to images.
 //!
 //! A [`Film`] is a list of [`FilmTile`]s. A tile owns its pixels' accumulators,
 //! and a sample counts for the one pixel it was taken in, because pixel filters
@@ -7,95 +7,24 @@
 //! samples of a pixel are added in order, the sums have the same bits for any
 //! number of threads.
 //!
-//! [`Film::develop`] turns sums into an [`Image`], which [`OutputPath`] writes
-//! as EXR or PNG and [`read_exr`] reads back.
+//! [`Film::develop`] turns sums into an [`Image`].
 
-mod exr;
 mod filter;
-mod image;
 mod noise;
-mod output;
 mod plan;
 mod resume;
 mod tile;
 
-pub use exr::{ExrError, read_exr};
 pub use filter::PixelFilter;
-pub use image::{Image, Layer};
-pub use output::{OutputError, OutputPath};
 pub use plan::{Draws, Spread};
 pub use resume::{ResumeError, sidecar_path};
 pub use tile::{Fault, FaultCount, FilmTile, Sample};
 
+use crate::image::{Image, Layer, Window};
+
 /// Side of a tile in pixels: small enough to share out evenly among threads,
 /// large enough that neighbours in memory are worked on by one thread.
 const TILE_SIZE: u32 = 16;
-
-/// A rectangle of pixels; columns count to the right and rows downwards, from
-/// the top left of the full image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// First column.
-    pub x: u32,
-    /// First row.
-    pub y: u32,
-    /// Number of columns.
-    pub width: u32,
-    /// Number of rows.
-    pub height: u32,
-}
-
-impl Window {
-    /// All of an image of the given width and height in pixels.
-    pub const fn full(resolution: [u32; 2]) -> Self {
-        Self {
-            x: 0,
-            y: 0,
-            width: resolution[0],
-            height: resolution[1],
-        }
-    }
-
-    /// Number of pixels.
-    pub const fn area(&self) -> usize {
-        self.width as usize * self.height as usize
-    }
-
-    /// The pixels, row by row.
-    pub fn pixels(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
-        let Self {
-            x,
-            y,
-            width,
-            height,
-        } = *self;
-        (y..y + height).flat_map(move |row| (x..x + width).map(move |column| [column, row]))
-    }
-
-    /// The pixels in both windows, if there are any.
-    pub fn intersect(&self, other: Self) -> Option<Self> {
-        let overlap = |a: u32, a_size: u32, b: u32, b_size: u32| {
-            let start = a.max(b);
-            let end = (a + a_size).min(b + b_size);
-            (end > start).then(|| (start, end - start))
-        };
-        let (x, width) = overlap(self.x, self.width, other.x, other.width)?;
-        let (y, height) = overlap(self.y, self.height, other.y, other.height)?;
-        Some(Self {
-            x,
-            y,
-            width,
-            height,
-        })
-    }
-
-    /// Where `pixel` comes in the order of [`Self::pixels`].
-    fn index(&self, pixel: [u32; 2]) -> usize {
-        debug_assert!(self.x <= pixel[0] && pixel[0] - self.x < self.width);
-        debug_assert!(self.y <= pixel[1] && pixel[1] - self.y < self.height);
-        (pixel[1] - self.y) as usize * self.width as usize + (pixel[0] - self.x) as usize
-    }
-}
 
 /// An arbitrary output variable: a layer of the image beside its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

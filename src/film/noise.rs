@@ -41,7 +41,8 @@ impl Film {
 
 #[cfg(test)]
 mod tests {
-    use crate::film::{AovSet, Film, Sample, Window};
+    use crate::film::{AovSet, Film, Sample};
+    use crate::image::Window;
     use crate::sampler::{Dimension, Sampler};
 
     const SIDE: u32 = 128;

@@ -1,6 +1,7 @@
 //! Of how many parts the samples of a pixel consist, by how much that helps.
 
-use super::{Film, FilmTile, Window};
+use super::{Film, FilmTile};
+use crate::image::Window;
 use crate::metrics::REL_EPSILON;
 
 /// Rays that a sample traces on average when nobody says into how many branches

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Draws;
 use super::tile::{FAULT_PIXELS, Fault};
-use super::{AovSet, Film, OutputError, Window, output};
+use super::{AovSet, Film};
+use crate::image::{OutputError, Window, replace};
 
 const MAGIC: &[u8; 16] = b"smithwalk film\0\x05";
 
@@ -107,7 +108,7 @@ impl Film {
         }
         let checksum = checksum(&bytes);
         bytes.extend_from_slice(&checksum.to_le_bytes());
-        output::replace(path, |file| {
+        replace(path, |file| {
             file.write_all(&bytes).map_err(|error| error.to_string())
         })
     }

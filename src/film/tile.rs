@@ -1,7 +1,8 @@
 //! The accumulators of a tile of pixels.
 
 use super::plan::{Draws, Pilot, Spread};
-use super::{Aov, AovSet, Window};
+use super::{Aov, AovSet};
+use crate::image::Window;
 
 /// Pixel positions that are remembered per cause of a fault.
 pub(super) const FAULT_PIXELS: usize = 8;

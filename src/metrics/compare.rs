@@ -1,6 +1,6 @@
 //! All figures at once, for images from files.
 
-use crate::film::{Image, Window};
+use crate::image::{Image, Window};
 
 use super::ztest::guard_variance;
 use super::{
@@ -104,7 +104,7 @@ impl Pair {
                 b: b.window,
             })?;
         let (a, b) = (a.crop(window), b.crop(window));
-        let layer = |image: &Image| image.layer("variance").and_then(crate::film::Layer::rgb);
+        let layer = |image: &Image| image.layer("variance").and_then(crate::image::Layer::rgb);
         let mut variance = None;
         for layer in [layer(&a), layer(&b)].into_iter().flatten() {
             let sum: &mut Vec<[f64; 3]> =
@@ -201,7 +201,7 @@ impl Pair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Layer;
+    use crate::image::Layer;
 
     fn image(value: f32) -> Image {
         let mut image = Image::black([20, 10], Window::full([20, 10]));

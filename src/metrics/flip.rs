@@ -1,6 +1,6 @@
 //! What a person sees of a difference.
 
-use crate::film::Image;
+use crate::image::Image;
 
 /// Mean of the ꟻLIP error map (Andersson et al. 2020, "FLIP: A Difference
 /// Evaluator for Alternating Images", Proc. ACM CGIT 3(2)), between 0 (nobody
@@ -27,7 +27,7 @@ pub fn flip(a: &Image, b: &Image, exposure: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Window;
+    use crate::image::Window;
 
     fn grey(value: f32) -> Image {
         let mut image = Image::black([32, 32], Window::full([32, 32]));

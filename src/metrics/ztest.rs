@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::film::Window;
+use crate::image::Window;
 
 /// The chance that a test fails although both images have the same expectation.
 pub const FALSE_ALARM_RATE: f64 = 0.01;

@@ -4,7 +4,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use smithwalk::description::{Description, Filter};
-use smithwalk::film::{Aov, Film, Image, PixelFilter, Window};
+use smithwalk::film::{Aov, Film, PixelFilter};
+use smithwalk::image::{Image, Window};
 use smithwalk::integrator::{Limits, RenderRequest, render};
 use smithwalk::scene::{Scene, resolve};
 

@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::Run;
 use crate::camera::Camera;
-use crate::film::{AovSet, Film, Image, PixelFilter, Window};
+use crate::film::{AovSet, Film, PixelFilter};
+use crate::image::{Image, Window};
 use crate::integrator::{Limits, RenderRequest, render};
 use crate::metrics::{REL_EPSILON, noise_floor, rel_mse_trimmed};
 use crate::scene::Scene;
@@ -132,7 +133,7 @@ impl Reference {
         if let Some(seed) = seed.filter(|seed| seeds.contains(seed)) {
             return Err(ReferenceError::SameSeed(seed));
         }
-        let variance = image.layer("variance").and_then(crate::film::Layer::rgb);
+        let variance = image.layer("variance").and_then(crate::image::Layer::rgb);
         Ok(Self {
             color: image.color.clone(),
             floor: variance.map(|variance| noise_floor(&image.color, &variance)),
@@ -261,7 +262,7 @@ pub fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Layer;
+    use crate::image::Layer;
 
     fn image(value: f32) -> Image {
         let mut image = Image::black([8, 4], Window::full([8, 4]));

@@ -1,6 +1,16 @@
-//! A finished image in memory.
+//! Finished images: in memory, as OpenEXR files, as output files.
+//!
+//! [`OutputPath`] writes an [`Image`] as EXR or PNG, [`read_exr`] reads one back.
 
-use super::Window;
+mod exr;
+mod output;
+mod window;
+
+pub use exr::{ExrError, read_exr};
+pub use output::{OutputError, OutputPath};
+pub use window::Window;
+
+pub(crate) use output::replace;
 
 /// An image with its layers, as developed from a film or read from a file.
 #[derive(Clone, Debug, PartialEq)]

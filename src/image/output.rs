@@ -133,7 +133,7 @@ impl OutputPath {
 }
 
 /// Writes a file under a temporary name beside `path` and renames it.
-pub(super) fn replace(
+pub(crate) fn replace(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
 ) -> Result<(), OutputError> {
