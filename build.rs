@@ -13,6 +13,11 @@ const LIBRARY: &str = "libembree4.so";
 fn main() {
     println!("cargo:rerun-if-env-changed=EMBREE_DIR");
     println!("cargo:rerun-if-changed=build.rs");
+    // Documentation is built without linking, where no Embree is.
+    println!("cargo:rerun-if-env-changed=DOCS_RS");
+    if env::var_os("DOCS_RS").is_some() {
+        return;
+    }
     let manifest = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("set by cargo"));
 
     let multiarch = format!(
