@@ -18,9 +18,18 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "sce
 import bpy  # noqa: E402
 import common  # noqa: E402
 from smithwalk_export import yaml  # noqa: E402
-from smithwalk_export.scene import export  # noqa: E402
+from smithwalk_export.log import APPROXIMATE, WRONG  # noqa: E402
+from smithwalk_export.scene import NO_BAKE, export  # noqa: E402
 
 NEW = bpy.app.version >= (4, 0, 0)
+STORES = ("scenes", "objects", "meshes", "materials", "worlds", "images", "node_groups", "cameras", "lights",
+          "collections")
+
+
+def stored():
+    """The names of all datablocks that an export could leave behind."""
+    return {store: sorted(b.name for b in getattr(bpy.data, store) if b.name != "Render Result")
+            for store in STORES}
 
 
 class ExportTest(unittest.TestCase):
@@ -32,12 +41,16 @@ class ExportTest(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
 
-    def export(self):
+    def export(self, **options):
         """Export; the lines of scene.yaml, without the leading spaces, and the warnings."""
-        self.log = export(self.scene, self.folder.name)
+        self.log = export(self.scene, self.folder.name, **options)
         with open(self.path("scene.yaml"), encoding="utf-8") as f:
             self.lines = [line.strip(" -\n") for line in f]
         return self.lines
+
+    def losses(self):
+        """What the export said is wrong or approximate."""
+        return [str(e) for e in self.log.of(WRONG, APPROXIMATE)]
 
     def path(self, name):
         """A file of the export."""
@@ -86,7 +99,7 @@ class ExportTest(unittest.TestCase):
         self.export()
         self.assertEqual(sum(line.startswith("{name: Cube") for line in self.lines), 1)
         self.assertEqual(len(self.faces("cube.obj")[1]), 6 * 16 * 2)
-        self.assertEqual(self.log.warnings, [])
+        self.assertEqual(self.losses(), [])
 
     def test_instances_share_a_mesh(self):
         """A mesh is written once; a mirrored instance keeps its negative determinant."""
@@ -127,7 +140,7 @@ class ExportTest(unittest.TestCase):
         bpy.context.object.data.bevel_depth = 0.1
         self.export()
         self.assertEqual(self.log.counts["objects"], 2)
-        self.assertEqual(self.log.warnings, [])
+        self.assertEqual(self.losses(), [])
 
     def test_concave_polygons_are_triangulated_as_in_blender(self):
         """A fan over an L would cover its notch."""
@@ -205,7 +218,7 @@ class ExportTest(unittest.TestCase):
         self.assertEqual(self.line("test:"),
                          "test: {mix: {factor: 0.125, a: {dielectric: {roughness: 0.5, ior: 1.25, color: 1}}, "
                          "b: {emission: {color: [2, 1, 0.5], strength: 3}}}}")
-        self.assertEqual(self.log.warnings, [])
+        self.assertEqual(self.losses(), [])
 
     def test_node_groups_are_looked_into(self):
         """A shader inside a group, with a colour from the group's input."""
@@ -256,7 +269,7 @@ class ExportTest(unittest.TestCase):
         self.assertEqual(self.line("test:"), "test: {conductor: {roughness: {texture: cells, channel: g}, "
                                              "color: {texture: cells}}}")
         self.assertTrue(os.path.isfile(self.path("cells.png")))
-        self.assertEqual(self.log.warnings, [])
+        self.assertEqual(self.losses(), [])
 
     def test_principled(self):
         """Metal turns into Schlick's Fresnel, with the opposite anisotropy."""
@@ -268,25 +281,38 @@ class ExportTest(unittest.TestCase):
         self.assertEqual(self.line("test:"),
                          f"test: {{conductor: {{alpha_x: {yaml.number(0.25 / aspect)}, "
                          f"alpha_y: {yaml.number(0.25 * aspect)}, tangent: {{radial: z}}, f0: [1, 0.75, 0.25]}}}}")
-        self.assertEqual(self.log.warnings, [])
+        self.assertEqual(self.losses(), [])
 
     def test_losses_are_named(self):
         """A shader without counterpart: a magenta placeholder, and a warning with material and node."""
-        self.surface("ShaderNodeBsdfTranslucent")
+        self.surface("ShaderNodeBsdfHair")
         self.export()
         self.assertEqual(self.line("test:"), "test: {diffuse: {color: [1, 0, 1]}}")
-        self.assertEqual(len(self.log.warnings), 1)
-        self.assertRegex(self.log.warnings[0], 'material "Test", node "Translucent BSDF"')
+        self.assertEqual(len(self.losses()), 1)
+        self.assertRegex(self.losses()[0], 'material "Test", node "Hair BSDF"')
         self.assertIn("1 thing(s) not carried", self.log.summary())
 
-    def test_procedural_values_are_named(self):
-        """A noise texture on roughness: its default, and a warning."""
+    def noise_on_roughness(self):
+        """A glossy cube whose roughness is a noise texture."""
         mat, node = self.surface("ShaderNodeBsdfGlossy", Roughness=0.25)
         noise = mat.node_tree.nodes.new("ShaderNodeTexNoise")
         mat.node_tree.links.new(noise.outputs[0], node.inputs["Roughness"])
-        self.export()
+
+    def test_without_bakes_procedural_values_are_named(self):
+        """A noise texture on roughness: its default, and a warning."""
+        self.noise_on_roughness()
+        self.export(bake=NO_BAKE)
         self.assertIn("roughness: 0.25", self.line("test:"))
-        self.assertRegex(self.log.warnings[0], 'material "Test", node "Glossy BSDF": Roughness comes from node "Noise')
+        self.assertRegex(self.losses()[0], 'material "Test", node "Glossy BSDF": Roughness comes from node "Noise')
+
+    def test_procedural_values_are_baked(self):
+        """A noise texture on roughness: an image over the unwrapped cube, and no warning."""
+        self.noise_on_roughness()
+        before = stored()
+        self.export(bake_size=64)
+        self.assertIn("roughness: {texture: baked_test_glossy_bsdf_roughness, channel: r}", self.line("test:"))
+        self.assertEqual(self.losses(), [])
+        self.assertEqual(stored(), before)
 
     # Lights, camera, settings
 

@@ -4,6 +4,7 @@ import os
 import shutil
 
 import bpy
+import numpy as np
 
 from .meshes import unique_name
 
@@ -13,7 +14,6 @@ _SIGNATURES = [
     (b"\xff\xd8\xff", ".jpg"),
     (b"\x76\x2f\x31\x01", ".exr"),
     (b"#?RADIANCE", ".hdr"),
-    (b"#?RGBE", ".hdr"),
 ]
 
 
@@ -21,66 +21,117 @@ def _known_extension(head):
     return next((ext for magic, ext in _SIGNATURES if head.startswith(magic)), None)
 
 
+def pixels_of(image):
+    """The stored values, (height, width, channels), bottom row first; None without pixels."""
+    width, height = image.size
+    if not width or not height:
+        return None
+    values = np.empty(width * height * image.channels, dtype=np.float32)
+    try:
+        image.pixels.foreach_get(values)
+    except (RuntimeError, TypeError):
+        return None
+    return values.reshape(height, width, image.channels)
+
+
 class ImageWriter:
     """Writes each Blender image once; the name of the file is its identity."""
 
-    def __init__(self, folder, log):
-        self.folder = folder
+    def __init__(self, files, log):
+        self.files = files
         self.log = log
-        self._files = {}  # image name_full → file name or None
+        self._written = {}  # (image name_full, alpha multiplied) → file name or None
 
-    def add(self, image, where):
-        """The file name of an image, or None (with a warning) if it has no pixels."""
-        key = image.name_full
-        if key not in self._files:
-            self._files[key] = self._write(image, where)
-        return self._files[key]
+    def add(self, image, where, multiply_alpha=False):
+        """The file name of an image, or None (with a warning) if it has no pixels.
 
-    def _write(self, image, where):
+        With `multiply_alpha` the stored colour is multiplied by the stored
+        alpha, as Cycles does where an image's alpha is not asked for.
+        """
+        multiply_alpha = multiply_alpha and self._has_alpha(image)
+        key = (image.name_full, multiply_alpha)
+        if key not in self._written:
+            self._written[key] = self._write(image, where, multiply_alpha)
+        return self._written[key]
+
+    @staticmethod
+    def _has_alpha(image):
+        if image.is_float or image.channels != 4:
+            return False
+        pixels = pixels_of(image)
+        return pixels is not None and bool((pixels[..., 3] < 1.0).any())
+
+    def _write(self, image, where, multiply_alpha):
         if image.source not in {"FILE", "GENERATED"}:
             self.log.warn(where, f'image "{image.name}" is a {image.source.lower()}: '
                                  "only its current frame or first tile is written")
         stem = os.path.splitext(os.path.basename(image.filepath) or image.name)[0]
-        taken = {os.path.splitext(f)[0] for f in self._files.values() if f}
-        stem = unique_name(stem, taken)
+        stem = unique_name(stem, ())
+        if image.source == "FILE" and not image.packed_file \
+                and not os.path.isfile(image.filepath_from_user()) and not image.has_data:
+            self.log.wrong(where, f'image "{image.name}": no such file: {image.filepath_from_user()}')
+            return None
 
         # The bytes as they are, when the renderer can read them: lossless.
-        if not image.is_dirty and image.source == "FILE":
+        if not image.is_dirty and image.source == "FILE" and not multiply_alpha:
             if image.packed_file:
-                extension = _known_extension(image.packed_file.data[:16])
+                data = image.packed_file.data
+                extension = _known_extension(data[:16])
                 if extension:
-                    with open(os.path.join(self.folder, stem + extension), "wb") as f:
-                        f.write(image.packed_file.data)
-                    return stem + extension
-            else:
-                path = image.filepath_from_user()
-                if not os.path.isfile(path):
-                    self.log.warn(where, f'image "{image.name}": no such file: {path}')
-                    return None
-                with open(path, "rb") as f:
+                    path, name = self.files.new(stem + extension)
+                    with open(path, "wb") as f:
+                        f.write(data)
+                    return name
+            elif os.path.isfile(image.filepath_from_user()) and image.size[0]:
+                source = image.filepath_from_user()
+                with open(source, "rb") as f:
                     extension = _known_extension(f.read(16))
                 if extension:
-                    target = os.path.join(self.folder, stem + extension)
-                    if not (os.path.exists(target) and os.path.samefile(path, target)):
-                        shutil.copyfile(path, target)
-                    return stem + extension
-        return self._convert(image, stem, where)
+                    inside = self.files.inside(source)
+                    if inside:
+                        return inside
+                    path, name = self.files.new(stem + extension)
+                    shutil.copyfile(source, path)
+                    return name
+        return self._convert(image, stem, where, multiply_alpha)
 
-    def _convert(self, image, stem, where):
-        copy = image.copy()
-        try:
-            if not copy.has_data and copy.pixels:  # reading `pixels` loads the file
-                pass
-            if not copy.has_data:
-                self.log.warn(where, f'image "{image.name}" has no pixels')
-                return None
-            extension, kind = (".exr", "OPEN_EXR") if copy.is_float else (".png", "PNG")
-            copy.filepath_raw = os.path.join(self.folder, stem + extension)
-            copy.file_format = kind
-            copy.save()
-        except RuntimeError as error:
-            self.log.warn(where, f'image "{image.name}" can\'t be written: {error}')
+    def _convert(self, image, stem, where, multiply_alpha):
+        pixels = pixels_of(image)
+        if pixels is None:
+            self.log.wrong(where, f'image "{image.name}" has no pixels')
             return None
-        finally:
-            bpy.data.images.remove(copy)
-        return stem + extension
+        rgba = np.ones((*pixels.shape[:2], 4), dtype=np.float32)
+        if pixels.shape[2] == 1:
+            rgba[..., :3] = pixels
+        else:
+            rgba[..., :pixels.shape[2]] = pixels
+        if multiply_alpha:
+            rgba[..., :3] *= rgba[..., 3:]
+            rgba[..., 3] = 1.0
+        return self.save(rgba, stem, image.is_float, where)
+
+    def save(self, rgba, stem, is_float, where):
+        """Write an array (bottom row first) as EXR or 8-bit PNG; the file's name, or None."""
+        path, name = self.files.new(stem + (".exr" if is_float else ".png"))
+        try:
+            save_image(path, rgba, is_float)
+        except RuntimeError as error:
+            self.files.drop(name)
+            self.log.wrong(where, f'image "{stem}" can\'t be written: {error}')
+            return None
+        return name
+
+
+def save_image(path, rgba, is_float):
+    """Write stored values, (height, width, 4), bottom row first, as they are."""
+    height, width, _ = rgba.shape
+    image = bpy.data.images.new("smithwalk", width, height, alpha=True, float_buffer=is_float)
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        image.alpha_mode = "CHANNEL_PACKED"
+        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        image.filepath_raw = path
+        image.file_format = "OPEN_EXR" if is_float else "PNG"
+        image.save()
+    finally:
+        bpy.data.images.remove(image)

@@ -1,16 +1,61 @@
 """Shader nodes to the materials of the scene format.
 
 One function per node type returns a material as the format writes it, e.g.
-`{"conductor": {"roughness": 0.5}}`. What has no counterpart is named in the
-log; a surface that can't be carried at all becomes the magenta placeholder.
+`{"conductor": {"roughness": 0.5}}`. What varies in a way the format has no
+word for was baked (bake.py); what has no counterpart is named in the log; a
+surface that can't be carried at all becomes the magenta placeholder.
 """
 
-from . import nodes
+import math
+
+import bpy
+
+from . import bake, nodes
+from .audit import Audit
+from .bake import uniform
+from .log import Log
 from .meshes import unique_name
-from .nodes import Texture, Unknown, evaluate, follow
+from .nodes import Graph, Texture, Unknown, dependencies, describe
 
 PLACEHOLDER = {"diffuse": {"color": [1.0, 0.0, 1.0]}}
 BLACK = {"diffuse": {"color": 0.0}}
+NEW = bpy.app.version >= (4, 0, 0)
+# Which of Cycles' models of the Principled and Diffuse nodes this Blender has.
+PRINCIPLED_VERSION = 3.4 if not NEW else 4.5 if bpy.app.version < (5, 0, 0) else 5.0
+DIFFUSE_VERSION = 4.5 if bpy.app.version >= (4, 3, 0) else 3.4
+
+# Sockets of the Principled node that the format has keys for: the key is the
+# name in lower case with underscores. (default, least, most) for numbers.
+_NUMBERS = {
+    3.4: {"subsurface": (0.0, 0.0, 1.0), "metallic": (0.0, 0.0, 1.0), "specular": (0.5, 0.0, None),
+          "specular_tint": (0.0, 0.0, 1.0), "roughness": (0.5, 0.0, 1.0), "anisotropic": (0.0, 0.0, 1.0),
+          "sheen": (0.0, 0.0, 1.0), "sheen_tint": (0.5, 0.0, 1.0), "clearcoat": (0.0, 0.0, 1.0),
+          "clearcoat_roughness": (0.03, 0.0, 1.0), "ior": (1.45, 1e-3, None), "transmission": (0.0, 0.0, 1.0),
+          "transmission_roughness": (0.0, 0.0, 1.0), "emission_strength": (1.0, 0.0, None),
+          "alpha": (1.0, 0.0, 1.0)},
+    4.5: {"metallic": (0.0, 0.0, 1.0), "roughness": (0.5, 0.0, 1.0), "ior": (1.5, 1e-3, None),
+          "alpha": (1.0, 0.0, 1.0), "diffuse_roughness": (0.0, 0.0, 1.0), "subsurface_weight": (0.0, 0.0, 1.0),
+          "specular_ior_level": (0.5, 0.0, None), "anisotropic": (0.0, 0.0, 1.0),
+          "transmission_weight": (0.0, 0.0, 1.0), "coat_weight": (0.0, 0.0, 1.0),
+          "coat_roughness": (0.03, 0.0, 1.0), "coat_ior": (1.5, 1.0, None), "sheen_weight": (0.0, 0.0, 1.0),
+          "sheen_roughness": (0.5, 0.0, 1.0), "emission_strength": (0.0, 0.0, None)},
+}
+_COLORS = {
+    3.4: {"base_color": 0.8, "subsurface_color": 0.8, "emission": 0.0},
+    4.5: {"base_color": 0.8, "specular_tint": 1.0, "coat_tint": 1.0, "sheen_tint": 1.0, "emission_color": 1.0},
+}
+for _table in (_NUMBERS, _COLORS):
+    _table[5.0] = _table[4.5]
+# Inputs that say nothing while the input they shape is 0.
+_IDLE = {
+    "Subsurface": ("Subsurface Radius", "Subsurface IOR", "Subsurface Anisotropy", "Subsurface Color"),
+    "Subsurface Weight": ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
+    "Anisotropic": ("Anisotropic Rotation", "Tangent"),
+    "Clearcoat": ("Clearcoat Normal", "Clearcoat Roughness"),
+    "Coat Weight": ("Coat Normal", "Coat Roughness", "Coat IOR", "Coat Tint"),
+    "Thin Film Thickness": ("Thin Film IOR",),
+}
+_UNITLESS = {"emission", "emission_color"}  # colours that may pass 1
 
 
 def _grey(rgb):
@@ -19,39 +64,52 @@ def _grey(rgb):
 
 
 class MaterialWriter:
-    """Translates each Blender material once; owns the scene's textures."""
+    """Translates each Blender material, once for each site it is baked at; owns the textures."""
 
-    def __init__(self, images, log):
+    def __init__(self, images, log, audit):
         self.images = images
         self.log = log
+        self.audit = audit
         self.materials = {}     # name in the scene → material
         self.textures = {}      # name in the scene → texture
-        self.radial_axes = {}   # name in the scene → set of axes its tangents turn about
-        self.uv_maps = {}       # name in the scene → set of UV map names it asks for
-        self._names = {}        # Blender's name_full (or None) → name in the scene
-        self._textures = {}     # (Texture without channel) → name in the scene
+        self.radial_axes = {}   # name in the scene → axes its tangents turn about
+        self._names = {}        # (Blender's name_full or None, site key) → name in the scene
+        self._textures = {}
+        self._needs = {}
 
-    def add(self, material):
-        """The name in the scene of a Blender material (None: Cycles' default surface)."""
+    def needs(self, material):
+        """What of a material has to be baked."""
         key = material.name_full if material else None
+        if key not in self._needs:
+            recorder = bake.Recorder()
+            if material is not None:
+                probe = MaterialWriter(None, Log(), Audit())
+                probe.radial_axes["probe"] = set()
+                _Surface(probe, material, "probe", recorder).translate()
+            self._needs[key] = recorder.needs
+        return self._needs[key]
+
+    def add(self, material, site=None):
+        """The name in the scene of a Blender material (None: Cycles' default surface)."""
+        key = (material.name_full if material else None, site.key if site else None)
         if key not in self._names:
             name = unique_name(material.name if material else "default", self.materials)
             self._names[key] = name
             self.radial_axes[name] = set()
-            self.uv_maps[name] = set()
             self.materials[name] = None  # reserves the name
-            self.materials[name] = _Surface(self, material, name).translate()
+            self.materials[name] = _Surface(self, material, name, _Baked(self, material, site)).translate()
         return self._names[key]
 
     def texture(self, texture, where):
         """The name in the scene of a texture, or None when its image has no pixels."""
-        key = (texture.image.name_full, texture.color_space, texture.interpolation,
-               texture.scale, texture.offset)
+        key = (texture.image.name_full, texture.color_space, texture.interpolation, texture.scale,
+               texture.offset, texture.multiply_alpha)
         if key not in self._textures:
-            file = self.images.add(texture.image, where)
+            if self.images is None:  # a probe
+                return "probe"
+            file = self.images.add(texture.image, where, texture.multiply_alpha)
             name = None
             if file:
-                name = unique_name(file.rsplit(".", 1)[0], self.textures)
                 entry = {"file": file, "color_space": texture.color_space}
                 if texture.interpolation != "bilinear":
                     entry["interpolation"] = texture.interpolation
@@ -59,25 +117,85 @@ class MaterialWriter:
                     entry["scale"] = list(texture.scale)
                 if texture.offset != (0.0, 0.0):
                     entry["offset"] = list(texture.offset)
-                self.textures[name] = entry
+                name = self._add_texture(file, entry)
             self._textures[key] = name
         return self._textures[key]
+
+    def _add_texture(self, file, entry):
+        name = unique_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], self.textures)
+        self.textures[name] = entry
+        return name
+
+    def baked_texture(self, site, material, request, image):
+        """The name in the scene of a baked image."""
+        key = (site.key, material.name_full, request)
+        if key not in self._textures:
+            import numpy as np
+            rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
+            rgba[..., :3] = np.where(np.isfinite(image), image, 0.0)
+            label = unique_name(f"{material.name}_{request[1]}_{request[2] or 'all'}", ())
+            file = self.images.save(rgba, f"baked_{label}", True, f'material "{material.name}"')
+            name = None
+            if file:
+                entry = {"file": file, "color_space": "linear"}
+                u0, v0, u1, v1 = site.bounds
+                if site.bounds != (0.0, 0.0, 1.0, 1.0):
+                    entry["scale"] = [1.0 / (u1 - u0), 1.0 / (v1 - v0)]
+                    entry["offset"] = [-u0 / (u1 - u0), -v0 / (v1 - v0)]
+                name = self._add_texture(file, entry)
+            self._textures[key] = name
+        return self._textures[key]
+
+
+class _Baked:
+    """Results of a site for one material."""
+
+    def __init__(self, writer, material, site):
+        self.writer = writer
+        self.material = material
+        self.site = site
+        self.surface = site is not None and site.uv is not None
+
+    def value(self, socket, groups, whole=False, texture=False):
+        """A tuple of three floats, `{"texture": NAME}`, or None where nothing was baked."""
+        if self.site is None or (texture and not self.surface):
+            return None
+        request = bake.request(socket, groups, whole)
+        image = self.site.results.get((self.material.name_full, request))
+        if image is None:
+            return None
+        constant = uniform(image)
+        if constant is not None:
+            return constant
+        name = self.writer.baked_texture(self.site, self.material, request, image)
+        return {"texture": name} if name else None
 
 
 class _Surface:
     """The translation of one material's node tree."""
 
-    def __init__(self, writer, material, name):
+    def __init__(self, writer, material, name, baked):
         self.writer = writer
         self.material = material
         self.name = name
+        self.baked = baked
+        self.graph = Graph(writer.audit)
+
+    def _where(self, node=None):
+        where = f'material "{self.material.name}"' if self.material else "the default material"
+        return f"{where}, {describe(node)}" if node is not None else where
 
     def warn(self, what, node=None):
-        """Name a loss of this material."""
-        where = f'material "{self.material.name}"'
-        if node is not None:
-            where += f', node "{node.name}"'
-        self.writer.log.warn(where, what)
+        """Name an approximation in this material."""
+        self.writer.log.warn(self._where(node), what)
+
+    def wrong(self, what, node=None):
+        """Name something visibly wrong in this material."""
+        self.writer.log.wrong(self._where(node), what)
+
+    def note(self, what, node=None):
+        """Name something mended."""
+        self.writer.log.note(self._where(node), what)
 
     def translate(self):
         """The whole material."""
@@ -85,82 +203,127 @@ class _Surface:
         if material is None:
             return {"diffuse": {"color": 0.8}}
         if not material.use_nodes or material.node_tree is None:
-            return {"diffuse": {"color": _grey(tuple(material.diffuse_color)[:3])}}
+            return {"diffuse": {"color": _grey(tuple(min(max(c, 0.0), 1.0) for c in material.diffuse_color[:3]))}}
         output = material.node_tree.get_output_node("CYCLES")
-        if output is None or not output.inputs["Surface"].is_linked:
-            self.warn("has no surface: written as black")
+        if output is None:
+            self.note("has no output: black, as in Cycles")
             return BLACK
-        for name in ("Volume", "Displacement"):
-            if output.inputs[name].is_linked:
-                self.warn(f"{name.lower()} is left out")
-        self.writer.uv_maps[self.name] = nodes.uv_map_names(material.node_tree)
-        return self.closure(output.inputs["Surface"], ())
+        if output.inputs["Displacement"].is_linked:
+            self.warn("displacement is left out")
+        if output.inputs["Volume"].is_linked:
+            if not output.inputs["Surface"].is_linked:
+                self.wrong("a volume without a surface is left out: transparent")
+                return {"transparent": {}}
+            self.warn("its volume is left out")
+        if not output.inputs["Surface"].is_linked:
+            self.note("has no surface: black, as in Cycles")
+            return BLACK
+        surface = self.closure(output.inputs["Surface"], ())
+        for node, what in self.graph.lost():
+            if what == "input Normal (linked)":
+                what = "its normal input (bump or normal map)"
+            self.warn(f"{what}: left out", node)
+        view = self.writer.audit.view(material)
+        view.accept("use_nodes", "displacement_method", "cycles.displacement_method", "preview_render_type")
+        for what in self.writer.audit.leftovers(material):
+            self.warn(f"{what}: left out")
+        return surface
 
     def closure(self, socket, groups):
         """The material that feeds a shader socket."""
-        source = follow(socket, groups)
-        if not source.linked:
+        source = self.graph.follow(socket, groups)
+        if not source.linked or source.node.mute:
             return BLACK  # an empty shader socket neither reflects nor emits
-        translate = _CLOSURES.get(source.node.type)
+        if source.socket.type != "SHADER":
+            return self._color_as_surface(socket, groups, source)  # as Cycles: emission of strength 1
+        node = source.node
+        translate = _CLOSURES.get(node.type)
         if translate is None:
-            self.warn(f"{source.node.bl_label} has no counterpart: magenta placeholder", source.node)
+            self.wrong(f"{node.bl_label} has no counterpart: magenta placeholder", node)
             return PLACEHOLDER
-        normal = source.node.inputs.get("Normal")
-        if normal is not None and normal.is_linked:
-            self.warn("normal input (bump or normal map) is left out", source.node)
-        return translate(self, source.node, source.groups)
+        self.graph.view(node)
+        return translate(self, node, source.groups)
+
+    def _color_as_surface(self, socket, groups, source):
+        value = self.graph.evaluate(socket, groups) if source.socket.type in {"RGBA", "VALUE", "VECTOR"} else None
+        if isinstance(value, tuple):
+            return {"emission": {"color": _grey(tuple(max(c, 0.0) for c in value))}}
+        if isinstance(value, float):
+            return {"emission": {"color": max(value, 0.0)}}
+        self.wrong("a colour stands where a shader belongs: magenta placeholder", source.node)
+        return PLACEHOLDER
 
     # Values
 
+    def value(self, node, name, groups):
+        """A float, a tuple, `{"texture": …}` with a channel where the socket is a number,
+        or Unknown; what can be baked was."""
+        socket = node.inputs[name]
+        value = self.graph.evaluate(socket, groups)
+        if isinstance(value, (Unknown, Texture)):
+            baked = self.baked.value(socket, groups, texture=isinstance(value, Texture))
+            if isinstance(baked, tuple):
+                return sum(baked) / 3.0 if socket.type == "VALUE" else baked
+            if baked is not None:
+                return {**baked, "channel": "r"} if socket.type == "VALUE" else baked
+        if isinstance(value, Texture):
+            texture = self.writer.texture(value, self._where())
+            if texture is None:  # Cycles' colour of a missing image
+                return Unknown(f'image "{value.image.name}"')
+            if value.channel not in {None, "luminance"}:
+                return {"texture": texture, "channel": value.channel}
+            return {"texture": texture}
+        if isinstance(value, Unknown) and "view" in dependencies(socket, groups):
+            self.graph.head_on = True
+            typical = self.graph.evaluate(socket, groups)
+            self.graph.head_on = False
+            if isinstance(typical, (float, tuple)):
+                self.warn(f"{socket.name} depends on the view: its value seen head on is written", node)
+                return typical
+        return value
+
     def scalar(self, node, name, groups, low=None, high=None):
         """A number input: a float, or `{texture, channel}`."""
-        value = evaluate(node.inputs[name], groups)
-        if isinstance(value, Texture):
-            texture = self.writer.texture(value, f'material "{self.material.name}"')
-            if texture:
-                entry = {"texture": texture}
-                if value.channel != "luminance":
-                    entry["channel"] = value.channel
-                return entry
-            value = Unknown(f'image "{value.image.name}"')
+        value = self.value(node, name, groups)
+        if isinstance(value, dict):
+            return value
         label = node.inputs[name].name
         if isinstance(value, Unknown):
             used = float(node.inputs[name].default_value)
-            self.warn(f"{label} comes from {value.what}: replaced by {used:g}", node)
+            self.wrong(f"{label} comes from {value.what}: replaced by {used:g}", node)
             value = used
-        clamped = value if low is None else min(max(value, low), high)
+        clamped = value if math.isfinite(value) else 0.0
+        clamped = clamped if low is None else max(clamped, low)
+        clamped = clamped if high is None else min(clamped, high)
         if clamped != value:
-            self.warn(f"{label} {value:g} is clamped to {clamped:g}", node)
+            self.note(f"{label} {value:g} is clamped to {clamped:g}", node)
         return clamped
-
-    def constant(self, node, name, groups, low=None, high=None):
-        """A number input that the format allows no texture on."""
-        value = self.scalar(node, name, groups, low, high)
-        if isinstance(value, dict):
-            used = float(node.inputs[name].default_value)
-            self.warn(f"{name} can't be textured: replaced by {used:g}", node)
-            return used
-        return value
 
     def color(self, node, name, groups, unit=True):
         """A colour input: a number, a list, or `{texture}`; magenta if it can't be carried."""
-        value = evaluate(node.inputs[name], groups)
-        if isinstance(value, Texture):
-            texture = self.writer.texture(value, f'material "{self.material.name}"')
-            if texture:
-                return {"texture": texture}
-            value = Unknown(f'image "{value.image.name}"')
+        value = self.value(node, name, groups)
+        if isinstance(value, dict):
+            return value
         if isinstance(value, Unknown):
-            self.warn(f"{name} comes from {value.what}: magenta placeholder", node)
+            self.wrong(f"{name} comes from {value.what}: magenta placeholder", node)
             return [1.0, 0.0, 1.0]
-        clamped = tuple(min(max(c, 0.0), 1.0) for c in value) if unit else value
+        value = value if isinstance(value, tuple) else (value,) * 3
+        high = 1.0 if unit else math.inf
+        clamped = tuple(min(max(c, 0.0), high) if math.isfinite(c) else 0.0 for c in value)
         if clamped != value:
-            self.warn(f"{name} {value} is clamped to 0…1", node)
+            shown = ", ".join(f"{c:.4g}" for c in value)
+            self.warn(f"{name} ({shown}) is clamped to {'0…1' if unit else '0 and more'}", node)
         return _grey(clamped)
+
+    def idle(self, node, *names):
+        """These inputs say nothing here: they need no naming."""
+        for name in names:
+            if name in node.inputs:
+                self.graph.follow(node.inputs[name])
 
     def distribution(self, node):
         """The format's distribution and scattering keys for a node's menu, and whether α = 0."""
-        choice = node.distribution
+        choice = self.graph.view(node).distribution
         if choice == "MULTI_GGX":
             return {}, False
         if choice == "ASHIKHMIN_SHIRLEY":
@@ -172,9 +335,11 @@ class _Surface:
 
     def tangent(self, node, groups):
         """The `tangent` key of an anisotropic node."""
-        source = follow(node.inputs["Tangent"], groups)
+        source = self.graph.follow(node.inputs["Tangent"], groups)
         if source.linked and source.node.type == "TANGENT":
-            if source.node.direction_type == "UV_MAP":
+            view = self.graph.view(source.node)
+            view.accept("uv_map", "axis")
+            if view.direction_type == "UV_MAP":
                 return {}  # uv is the default
             axis = source.node.axis.lower()
         else:
@@ -188,9 +353,10 @@ class _Surface:
         """The rough keys of a Glossy, Anisotropic, Metallic or Glass node."""
         keys, sharp = self.distribution(node)
         if sharp:
+            self.idle(node, "Roughness", "Anisotropy", "Rotation", "Tangent")
             return {"alpha": 0.0}
         keys["roughness"] = self.scalar(node, "Roughness", groups, 0.0, 1.0)
-        if "Anisotropy" in node.inputs:
+        if "Anisotropy" in node.inputs and node.inputs["Anisotropy"].enabled:
             anisotropy = self.scalar(node, "Anisotropy", groups, -1.0, 1.0)
             if anisotropy != 0.0:
                 keys["anisotropy"] = anisotropy
@@ -198,15 +364,19 @@ class _Surface:
                 if rotation != 0.0:
                     keys["rotation"] = rotation
                 keys.update(self.tangent(node, groups))
+            else:
+                self.idle(node, "Rotation", "Tangent")
         return keys
 
     # Closures
 
     def diffuse(self, node, groups):
-        """Diffuse BSDF: Lambert. Its Roughness is Oren-Nayar's, which is another model."""
-        if self.scalar(node, "Roughness", groups) != 0.0:
-            self.warn("Roughness (Oren-Nayar) is left out: written as Lambert", node)
-        return {"diffuse": {"color": self.color(node, "Color", groups)}}
+        """Diffuse BSDF: Lambert, or Oren and Nayar's."""
+        keys = {"color": self.color(node, "Color", groups)}
+        roughness = self.scalar(node, "Roughness", groups, 0.0, 1.0)
+        if roughness != 0.0:
+            keys.update(roughness=roughness, version=DIFFUSE_VERSION)
+        return {"diffuse": keys}
 
     def glossy(self, node, groups):
         """Glossy and Anisotropic BSDF: the colour multiplies at every facet."""
@@ -216,164 +386,150 @@ class _Surface:
     def metallic(self, node, groups):
         """Metallic BSDF (4.3 and newer): complex IOR, or F82 tint."""
         keys = self.rough(node, groups)
-        if node.fresnel_type == "PHYSICAL_CONDUCTOR":
-            eta = evaluate(node.inputs["IOR"], groups)
-            k = evaluate(node.inputs["Extinction"], groups)
-            if isinstance(eta, tuple) and isinstance(k, tuple):
-                return {"conductor": {**keys, "eta": list(eta), "k": list(k)}}
-            self.warn("textured IOR or Extinction: magenta placeholder", node)
-            return PLACEHOLDER
+        if self.graph.view(node).fresnel_type == "PHYSICAL_CONDUCTOR":
+            return {"conductor": {**keys, "eta": self.color(node, "IOR", groups, unit=False),
+                                  "k": self.color(node, "Extinction", groups, unit=False)}}
         f0 = self.color(node, "Base Color", groups)
         tint = self.color(node, "Edge Tint", groups)
-        return {"conductor": {**keys, **self.f82(node, f0, tint)}}
+        return {"conductor": {**keys, "f0": f0, **({"edge_tint": tint} if tint != 1.0 else {})}}
 
-    def f82(self, node, f0, tint):
-        """Fresnel keys for Blender's edge tint, a factor on Schlick at cosθ = 1/7."""
-        if tint == 1.0:
-            return {"f0": f0}
-        if isinstance(f0, dict) or isinstance(tint, dict):
-            self.warn("a textured base colour or tint leaves out the edge tint", node)
-            return {"f0": f0}
-        f0 = f0 if isinstance(f0, list) else [f0] * 3
-        tint = tint if isinstance(tint, list) else [tint] * 3
-        at_82 = [(f + (1.0 - f) * (6.0 / 7.0) ** 5) * t for f, t in zip(f0, tint)]
-        return {"f0": f0, "f82": at_82}
+    def ior(self, node, groups):
+        """An index of refraction; Cycles keeps it above 0."""
+        return self.scalar(node, "IOR", groups, 1e-3)
 
     def glass(self, node, groups):
         """Glass BSDF."""
-        return {"dielectric": {**self.rough(node, groups),
-                               "ior": self.constant(node, "IOR", groups),
+        return {"dielectric": {**self.rough(node, groups), "ior": self.ior(node, groups),
                                "color": self.color(node, "Color", groups)}}
 
     def refraction(self, node, groups):
-        """Refraction BSDF: as glass, for the format has no refraction alone."""
-        self.warn("refraction alone is written as glass, which also reflects", node)
-        return self.glass(node, groups)
+        """Refraction BSDF."""
+        return {"refraction": {**self.rough(node, groups), "ior": self.ior(node, groups),
+                               "color": self.color(node, "Color", groups)}}
 
     def emission(self, node, groups):
         """Emission: radiance = colour · strength, W·m⁻²·sr⁻¹."""
-        return {"emission": {"color": self.color(node, "Color", groups, unit=False),
-                             "strength": self.constant(node, "Strength", groups)}}
+        strength = self.scalar(node, "Strength", groups, 0.0)
+        return {"emission": {"color": self.color(node, "Color", groups, unit=False), "strength": strength}}
 
     def transparent(self, node, groups):
-        """Transparent BSDF; its colour can't be textured."""
-        color = self.color(node, "Color", groups)
-        if isinstance(color, dict):
-            self.warn("a textured transparent colour is left out: written as white", node)
-            color = 1.0
-        return {"transparent": {"color": color}}
+        """Transparent BSDF."""
+        return {"transparent": {"color": self.color(node, "Color", groups)}}
+
+    def translucent(self, node, groups):
+        """Translucent BSDF."""
+        return {"translucent": {"color": self.color(node, "Color", groups)}}
+
+    def velvet(self, node, groups):
+        """Velvet BSDF (3.x)."""
+        return {"velvet": {"color": self.color(node, "Color", groups),
+                           "sigma": self.scalar(node, "Sigma", groups, 0.0, 1.0)}}
+
+    def sheen(self, node, groups):
+        """Sheen BSDF (4.0 and newer)."""
+        if self.graph.view(node).distribution == "ASHIKHMIN":
+            return {"velvet": {"color": self.color(node, "Color", groups),
+                               "sigma": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
+        return {"sheen": {"color": self.color(node, "Color", groups),
+                          "roughness": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
+
+    def subsurface(self, node, groups):
+        """Subsurface Scattering: light that comes out where it went in."""
+        self.warn("light comes out where it went in: written as diffuse of the same colour", node)
+        self.graph.view(node).accept("falloff")
+        self.idle(node, "Scale", "Radius", "IOR", "Anisotropy", "Roughness")
+        return {"diffuse": {"color": self.color(node, "Color", groups)}}
+
+    def holdout(self, node, groups):
+        """Holdout: a hole in the picture; black here."""
+        self.warn("a holdout is written as black", node)
+        return BLACK
 
     def mix(self, node, groups):
-        """Mix Shader; a factor from Fresnel or Layer Weight has no counterpart."""
-        factor = self.scalar(node, 0, groups, 0.0, 1.0) if not self.view_dependent(node, groups) \
-            else self.normal_incidence(node, groups)
+        """Mix Shader."""
+        factor, swapped = self.factor(node.inputs[0], groups, node)
+        first, second = (node.inputs[2], node.inputs[1]) if swapped else (node.inputs[1], node.inputs[2])
         if factor == 0.0:
-            return self.closure(node.inputs[1], groups)
+            self.graph.follow(second)
+            return self.closure(first, groups)
         if factor == 1.0:
-            return self.closure(node.inputs[2], groups)
-        return {"mix": {"factor": factor,
-                        "a": self.closure(node.inputs[1], groups),
-                        "b": self.closure(node.inputs[2], groups)}}
+            self.graph.follow(first)
+            return self.closure(second, groups)
+        return {"mix": {"factor": factor, "a": self.closure(first, groups), "b": self.closure(second, groups)}}
 
-    def view_dependent(self, node, groups):
-        """Whether a mix factor is a Fresnel or Layer Weight node."""
-        source = follow(node.inputs[0], groups)
-        return source.linked and source.node.type in {"FRESNEL", "LAYER_WEIGHT"}
-
-    def normal_incidence(self, node, groups):
-        """The Fresnel reflectance at normal incidence in place of a view-dependent factor."""
-        source = follow(node.inputs[0], groups)
-        if source.node.type == "FRESNEL":
-            ior = self.constant(source.node, "IOR", source.groups)
-        else:  # Layer Weight: Blender's own map from Blend to an IOR
-            blend = self.constant(source.node, "Blend", source.groups)
-            ior = 1.0 / max(1.0 - blend, 1e-5)
-        f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
-        self.warn(f"{source.node.bl_label} as a factor depends on the view: "
-                  f"replaced by {f0:.4g}, its value at normal incidence", node)
-        return f0
+    def factor(self, socket, groups, node):
+        """A mix's factor as the format writes it, and whether a and b change places."""
+        source = self.graph.follow(socket, groups)
+        if source.linked and not source.node.mute:
+            node_of = source.node
+            view = self.graph.view(node_of)
+            if node_of.type == "FRESNEL":
+                return {"fresnel": {"ior": self.ior(node_of, source.groups)}}, False
+            if node_of.type == "LAYER_WEIGHT":
+                blend = self.scalar(node_of, "Blend", source.groups, 0.0, 1.0)
+                if source.socket.name == "Facing":
+                    return {"facing": {"blend": blend}}, False
+                if isinstance(blend, float):
+                    return {"fresnel": {"ior": 1.0 / max(1.0 - blend, 1e-3)}}, False
+            if node_of.type == "NEW_GEOMETRY" and source.socket.name == "Backfacing":
+                return "backfacing", False
+            if node_of.type == "LIGHT_PATH" and source.socket.name == "Is Camera Ray":
+                return "camera_ray", False
+            if node_of.type == "INVERT" or (node_of.type == "MATH" and view.operation == "SUBTRACT"):
+                through = node_of.inputs[1]
+                whole = self.graph.evaluate(node_of.inputs[0], source.groups)
+                if whole == 1.0 and "view" in dependencies(through, source.groups):
+                    view.accept("use_clamp")
+                    factor, swapped = self.factor(through, source.groups, node)
+                    return factor, not swapped
+        return self.scalar(node, 0, groups, 0.0, 1.0), False
 
     def add(self, node, groups):
-        """Add Shader: only what stands first, except that an empty side changes nothing."""
-        sides = [s for s in node.inputs if follow(s, groups).linked]
+        """Add Shader; an empty side changes nothing."""
+        sides = [s for s in node.inputs if self.graph.follow(s, groups).linked]
         if not sides:
             return BLACK
-        if len(sides) == 2:
-            dropped = follow(sides[1], groups).node
-            self.warn(f'a sum of shaders can\'t be carried: "{dropped.name}" is left out', node)
-        return self.closure(sides[0], groups)
+        if len(sides) == 1:
+            return self.closure(sides[0], groups)
+        return {"sum": {"a": self.closure(sides[0], groups), "b": self.closure(sides[1], groups)}}
 
     def principled(self, node, groups):
-        """Principled BSDF: metal, glass or Lambert, mixed by Metallic and Transmission."""
-        def first(*names):
-            return next(n for n in names if n in node.inputs)
-
-        for names, off in (
-            (("Subsurface Weight", "Subsurface"), 0.0),
-            (("Coat Weight", "Clearcoat"), 0.0),
-            (("Sheen Weight", "Sheen"), 0.0),
-            (("Thin Film Thickness",), 0.0),
-            (("Diffuse Roughness",), 0.0),
-        ):
-            present = next((n for n in names if n in node.inputs), None)
-            if present and self.scalar(node, present, groups) != off:
-                self.warn(f"{present} is left out", node)
-
-        base = self.color(node, "Base Color", groups)
-        metallic = self.scalar(node, "Metallic", groups, 0.0, 1.0)
-        transmission = self.scalar(node, first("Transmission Weight", "Transmission"), groups, 0.0, 1.0)
-        keys = self.principled_rough(node, groups)
-
-        surface = None
-        if metallic != 1.0:
-            if transmission != 1.0:
-                self.warn("the specular layer over the diffuse base is left out: Lambert", node)
-            surface = _mix(
-                transmission,
-                {"diffuse": {"color": base}},
-                {"dielectric": {**keys, "ior": self.constant(node, "IOR", groups), "color": base}})
-        if metallic != 0.0:
-            tint = 1.0
-            if "Specular IOR Level" in node.inputs:  # 4.0 and newer: F82 tint
-                tint = self.color(node, "Specular Tint", groups)
-            metal = {"conductor": {**keys, **self.f82(node, base, tint)}}
-            surface = _mix(metallic, surface, metal)
-
-        strength = self.constant(node, "Emission Strength", groups)
-        if strength != 0.0:
-            glow = self.color(node, first("Emission Color", "Emission"), groups, unit=False)
-            if glow != 0.0:
-                self.warn("emission on top of a surface is left out", node)
-        alpha = self.scalar(node, "Alpha", groups, 0.0, 1.0)
-        return _mix(alpha, {"transparent": {}}, surface)
-
-    def principled_rough(self, node, groups):
-        """Rough keys of Principled, whose anisotropy turns the other way round:
-        aspect = √(1 − 0.9 a), α_x = r²/aspect, α_y = r² · aspect."""
-        keys, _ = self.distribution(node)
-        roughness = self.scalar(node, "Roughness", groups, 0.0, 1.0)
-        anisotropy = self.scalar(node, "Anisotropic", groups, 0.0, 1.0)
-        if anisotropy == 0.0:
-            return {**keys, "roughness": roughness}
-        if isinstance(roughness, dict) or isinstance(anisotropy, dict):
-            self.warn("Anisotropic with a texture on it or on Roughness is left out", node)
-            return {**keys, "roughness": roughness}
-        aspect = (1.0 - 0.9 * anisotropy) ** 0.5
-        keys["alpha_x"] = min(roughness ** 2 / aspect, 1.0)
-        keys["alpha_y"] = roughness ** 2 * aspect
-        rotation = self.scalar(node, "Anisotropic Rotation", groups)
-        if rotation != 0.0:
-            keys["rotation"] = rotation
-        return {**keys, **self.tangent(node, groups)}
-
-
-def _mix(factor, a, b):
-    """`b`'s share is `factor`; no mix at all at the ends."""
-    if factor == 0.0:
-        return a
-    if factor == 1.0:
-        return b
-    return {"mix": {"factor": factor, "a": a, "b": b}}
+        """Principled BSDF: the node's sockets, by the rules of this Blender's Cycles."""
+        version = PRINCIPLED_VERSION
+        keys = {"version": version, "layering": "cycles"}
+        choice = self.graph.view(node).distribution
+        if choice.lower() != ("ggx" if version == 3.4 else "multi_ggx"):
+            keys["distribution"] = choice.lower()
+        self.graph.view(node).accept("subsurface_method")
+        for socket in node.inputs:
+            if not socket.enabled:
+                continue
+            key = socket.name.lower().replace(" ", "_")
+            if key in _NUMBERS[version]:
+                default, low, high = _NUMBERS[version][key]
+                value = self.scalar(node, socket.name, groups, low, high)
+            elif key in _COLORS[version]:
+                default = _COLORS[version][key]
+                value = self.color(node, socket.name, groups, unit=key not in _UNITLESS)
+            else:
+                continue
+            if value == 0.0 and isinstance(value, float):
+                self.idle(node, *_IDLE.get(socket.name, ()))
+            if not (isinstance(value, float) and abs(value - default) < 1e-7):
+                keys[key] = value
+        if "Thin Film Thickness" in node.inputs and not node.inputs["Thin Film Thickness"].is_linked \
+                and node.inputs["Thin Film Thickness"].default_value == 0.0:
+            self.idle(node, *_IDLE["Thin Film Thickness"])
+        if keys.get("anisotropic"):
+            rotation = self.scalar(node, "Anisotropic Rotation", groups)
+            if rotation != 0.0:
+                keys["anisotropic_rotation"] = rotation
+            keys.update(self.tangent(node, groups))
+        if any(keys.get(k) for k in ("subsurface", "subsurface_weight")):
+            self.warn("subsurface light comes out where it went in", node)
+            self.idle(node, *_IDLE["Subsurface"], *_IDLE["Subsurface Weight"])
+        keys.setdefault("base_color", 0.8)
+        return {"principled": keys}
 
 
 _CLOSURES = {
@@ -384,8 +540,20 @@ _CLOSURES = {
     "BSDF_GLASS": _Surface.glass,
     "BSDF_REFRACTION": _Surface.refraction,
     "BSDF_TRANSPARENT": _Surface.transparent,
+    "BSDF_TRANSLUCENT": _Surface.translucent,
+    "BSDF_VELVET": _Surface.velvet,
+    "BSDF_SHEEN": _Surface.sheen,
+    "SUBSURFACE_SCATTERING": _Surface.subsurface,
     "BSDF_PRINCIPLED": _Surface.principled,
     "EMISSION": _Surface.emission,
+    "HOLDOUT": _Surface.holdout,
     "MIX_SHADER": _Surface.mix,
     "ADD_SHADER": _Surface.add,
 }
+
+
+def asks_for_uv_maps(material):
+    """The UV maps a material names."""
+    if material is None or not material.use_nodes or material.node_tree is None:
+        return set()
+    return nodes.uv_map_names(material.node_tree)

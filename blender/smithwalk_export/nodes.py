@@ -1,13 +1,18 @@
 """What feeds a socket: a constant, an image texture, or something else.
 
 Links are followed through reroutes, muted nodes and node groups. Chains of
-constant nodes (Value, RGB, Math, …) are folded.
+converter nodes on constants are folded (`fold.py`). All that is read of a
+node is recorded, so that the rest can be named (`audit.py`).
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import bpy
+
+from . import fold
+from .fold import NotConstant, luminance
+
+LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Linear BT.709"}
 
 
 @dataclass(frozen=True)
@@ -20,11 +25,12 @@ class Texture:
     scale: tuple = (1.0, 1.0)
     offset: tuple = (0.0, 0.0)
     channel: str = None
+    multiply_alpha: bool = False  # as Cycles does to a colour whose Alpha is not asked for
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """Something the scene format has no word for; `what` names it."""
+    """Something that only Cycles can evaluate; `what` names it."""
 
     what: str
 
@@ -43,39 +49,6 @@ class Source:
         return self.socket.node
 
 
-def luminance(rgb):
-    """Rec. 709 luminance: Blender's conversion of a colour to a number."""
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
-
-
-def follow(socket, groups=()):
-    """Where an input's value comes from, through reroutes, muting and groups."""
-    while True:
-        link = next((l for l in socket.links if l.is_valid and not l.is_muted), None)
-        if link is None:
-            return Source(socket, groups, linked=False)
-        out, node = link.from_socket, link.from_node
-        if node.bl_idname == "NodeReroute":
-            socket = node.inputs[0]
-        elif node.mute:
-            inner = next((l for l in node.internal_links if l.to_socket == out), None)
-            if inner is None:
-                return Source(out, groups, linked=True)
-            socket = inner.from_socket
-        elif node.type == "GROUP" and node.node_tree:
-            output = next((n for n in node.node_tree.nodes
-                           if n.type == "GROUP_OUTPUT" and n.is_active_output), None)
-            if output is None:
-                return Source(out, groups, linked=True)
-            socket = next(s for s in output.inputs if s.identifier == out.identifier)
-            groups = groups + (node,)
-        elif node.type == "GROUP_INPUT" and groups:
-            socket = next(s for s in groups[-1].inputs if s.identifier == out.identifier)
-            groups = groups[:-1]
-        else:
-            return Source(out, groups, linked=True)
-
-
 def _plain(value):
     """A socket's default as a float or a tuple of three floats."""
     if hasattr(value, "__len__"):
@@ -83,20 +56,212 @@ def _plain(value):
     return float(value)
 
 
-def _describe(node):
-    return f'node "{node.name}" ({node.bl_label})'
+def describe(node):
+    """A node for a message: its name, and its kind where the name does not say it."""
+    label = node.bl_label
+    return f'node "{node.name}"' if node.name.startswith(label) else f'node "{node.name}" ({label})'
 
 
-def evaluate(socket, groups=()):
-    """A float, a tuple of three floats, a Texture, or Unknown, in the socket's own type."""
-    source = follow(socket, groups)
-    if not source.linked:
-        if not hasattr(source.socket, "default_value"):
-            return Unknown("an empty input")
-        value = _plain(source.socket.default_value)
-    else:
-        value = _output(source)
-    return _convert(value, source.socket.type, socket.type)
+def link_into(socket):
+    """The link that feeds an input, or None."""
+    return next((l for l in socket.links if l.is_valid and not l.is_muted), None)
+
+
+def step(socket, groups):
+    """One step up from an input: (socket, groups, arrived), the socket an output when
+    arrived at a node, an input when the search goes on, None where nothing feeds it."""
+    link = link_into(socket)
+    if link is None:
+        return socket, groups, None
+    out, node = link.from_socket, link.from_node
+    if node.bl_idname == "NodeReroute":
+        return node.inputs[0], groups, False
+    if node.mute:
+        inner = next((l for l in node.internal_links if l.to_socket == out), None)
+        return (inner.from_socket, groups, False) if inner else (out, groups, True)
+    if node.type == "GROUP" and node.node_tree:
+        output = next((n for n in node.node_tree.nodes
+                       if n.type == "GROUP_OUTPUT" and n.is_active_output), None)
+        inside = output and next((s for s in output.inputs if s.identifier == out.identifier), None)
+        return (inside, groups + (node,), False) if inside else (out, groups, None)
+    if node.type == "GROUP":  # its tree is missing
+        return out, groups, None
+    if node.type == "GROUP_INPUT" and groups:
+        outside = next((s for s in groups[-1].inputs if s.identifier == out.identifier), None)
+        return (outside, groups[:-1], False) if outside else (out, groups, True)
+    return out, groups, True
+
+
+class Graph:
+    """The node trees of one material, light or world, and what was read of them."""
+
+    def __init__(self, audit):
+        self.audit = audit
+        self._inputs = {}   # node pointer → identifiers of the inputs read
+        self._nodes = {}    # node pointer → node
+        self.head_on = False  # take what depends on the view as seen head on, by the camera
+
+    def view(self, node):
+        """The node with its property reads recorded."""
+        self._nodes[node.as_pointer()] = node
+        return self.audit.view(node)
+
+    def lost(self):
+        """For each node that was read in part: (node, what was not read though it matters)."""
+        for key, node in self._nodes.items():
+            for what in self.audit.node_leftovers(node, self._inputs.get(key, set())):
+                yield node, what
+
+    def forget(self, node):
+        """Nothing of this node needs naming: it was named, or evaluated, as a whole."""
+        self._nodes.pop(node.as_pointer(), None)
+
+    def follow(self, socket, groups=()):
+        """Where an input's value comes from, through reroutes, muting and groups."""
+        self._inputs.setdefault(socket.node.as_pointer(), set()).add(socket.identifier)
+        arrived = False
+        while arrived is False:
+            socket, groups, arrived = step(socket, groups)
+        return Source(socket, groups, linked=arrived is True)
+
+    def evaluate(self, socket, groups=()):
+        """A float, a tuple of three floats, a Texture, or Unknown, in the socket's own type."""
+        source = self.follow(socket, groups)
+        if not source.linked:
+            if not hasattr(source.socket, "default_value"):
+                return Unknown("an empty input")
+            value = _plain(source.socket.default_value)
+        elif source.node.mute:
+            value = (0.0, 0.0, 0.0) if source.socket.type != "VALUE" else 0.0
+        else:
+            value = self._output(source)
+        return _convert(value, source.socket.type, socket.type)
+
+    def read(self, source, name):
+        """An input of a source's node, by name or index."""
+        inputs = source.node.inputs
+        if name == "Fac" and name not in inputs:
+            name = "Factor"
+        return self.evaluate(inputs[name], source.groups)
+
+    def _output(self, source):
+        node = source.node
+        view = self.view(node)
+
+        def unknown(what=None):
+            self.forget(node)
+            return Unknown(what or describe(node))
+
+        if node.type in {"VALUE", "RGB"}:
+            return _plain(node.outputs[0].default_value)
+        if node.type == "TEX_IMAGE":
+            value = self._image(source, view)
+            return unknown(value.what) if isinstance(value, Unknown) else value
+        if node.type in {"SEPRGB", "SEPARATE_COLOR", "SEPXYZ"}:
+            value = self._separate(source, view)
+            return unknown() if value is None else value
+        if node.type == "RGBTOBW":
+            value = self.read(source, 0)
+            if isinstance(value, Texture):
+                return replace(value, channel="luminance")
+            return luminance(value) if isinstance(value, tuple) else unknown()
+
+        if self.head_on and node.type in _VIEW | {"NEW_GEOMETRY"}:
+            value = self._seen_head_on(source)
+            return unknown() if value is None else value
+
+        def constant(name):
+            value = self.read(source, name)
+            if isinstance(value, (Texture, Unknown)):
+                raise NotConstant
+            return value
+
+        try:
+            value = fold.converter(view, constant)
+        except NotConstant:
+            return unknown()
+        return unknown() if value is None else value
+
+    def _seen_head_on(self, source):
+        """A view-dependent output for a camera ray along the normal, from outside."""
+        kind, name = source.node.type, source.socket.name
+        self.forget(source.node)
+        if kind == "LIGHT_PATH":
+            return 1.0 if name == "Is Camera Ray" else 0.0
+        if kind == "NEW_GEOMETRY":
+            return 0.0 if name == "Backfacing" else None
+        if kind in {"FRESNEL", "LAYER_WEIGHT"}:
+            value = self.read(source, 0)
+            if not isinstance(value, float):
+                return None
+            if name == "Facing":
+                return 0.0
+            ior = value if kind == "FRESNEL" else 1.0 / max(1.0 - value, 1e-5)
+            return ((ior - 1.0) / (ior + 1.0)) ** 2
+        return None
+
+    def _separate(self, source, view):
+        mode = view.get("mode", "RGB")
+        i = list(source.node.outputs).index(source.socket)
+        value = self.read(source, 0)
+        if isinstance(value, Texture):
+            return replace(value, channel="rgb"[i]) if mode == "RGB" and value.channel is None else None
+        if isinstance(value, Unknown):
+            return None
+        if mode == "HSV":
+            return fold.rgb_to_hsv(value)[i]
+        return value[i] if mode == "RGB" else None
+
+    def _image(self, source, view):
+        node = source.node
+        image = view.image
+        view.accept("image_user")  # frames of sequences are checked where the image is written
+        if image is None:
+            return (1.0, 0.0, 1.0)  # Cycles' colour of a missing image
+        for attribute, only in (("projection", "FLAT"), ("extension", "REPEAT")):
+            if getattr(view, attribute) != only:
+                return Unknown(f"{describe(node)} with {attribute} {getattr(node, attribute).lower()}")
+        view.accept("projection_blend")
+        if view.interpolation not in {"Closest", "Linear"}:
+            return Unknown(f"{describe(node)} with interpolation {node.interpolation.lower()}")
+        if image.source in {"TILED", "SEQUENCE", "MOVIE"}:
+            return Unknown(f'image "{image.name}", a {image.source.lower()} one')
+        space = image.colorspace_settings.name
+        if space != "sRGB" and space not in LINEAR_SPACES:
+            return Unknown(f'image "{image.name}" in colour space {space}')
+        asks_alpha = any(l.is_valid for l in node.outputs["Alpha"].links)
+        if asks_alpha and image.is_float and image.channels == 4 and image.alpha_mode in {"STRAIGHT", "PREMUL"}:
+            return Unknown(f'image "{image.name}" with colour and alpha in floats')  # Cycles divides by alpha
+        texture = Texture(
+            image=image,
+            color_space="srgb" if space == "sRGB" else "non_color",
+            interpolation="closest" if node.interpolation == "Closest" else "bilinear",
+            channel="a" if source.socket.name == "Alpha" else None,
+            multiply_alpha=image.alpha_mode in {"STRAIGHT", "PREMUL"} and space not in {"Non-Color", "Raw"}
+            and not asks_alpha,
+        )
+        return self._place(texture, self.follow(node.inputs["Vector"], source.groups))
+
+    def _place(self, texture, vector):
+        """Read scale and offset off a Mapping node, down to the UVs."""
+        if not vector.linked:
+            return texture
+        node = vector.node
+        view = self.view(node)
+        if node.type == "UVMAP" or (node.type == "TEX_COORD" and vector.socket.name == "UV"):
+            view.accept("uv_map")  # that it is the mesh's active one is checked per object
+            if not view.get("from_instancer"):
+                return texture
+        elif node.type == "MAPPING" and view.vector_type == "POINT":
+            location, rotation, scale = (
+                self.evaluate(node.inputs[name], vector.groups) for name in ("Location", "Rotation", "Scale"))
+            below = self.follow(node.inputs["Vector"], vector.groups)
+            # An empty Vector input of a Mapping node is (0, 0, 0), not the UVs.
+            if (all(isinstance(v, tuple) for v in (location, rotation, scale))
+                    and not any(rotation) and below.linked and below.node.type != "MAPPING"):
+                return self._place(replace(texture, scale=scale[:2], offset=location[:2]), below)
+        self.forget(node)
+        return Unknown(f"{describe(node)} as coordinates of an image")
 
 
 def _convert(value, from_type, to_type):
@@ -116,108 +281,67 @@ def _convert(value, from_type, to_type):
     return value
 
 
-def _input(source, name):
-    """Evaluate an input of a source's node by name or index."""
-    return evaluate(source.node.inputs[name], source.groups)
+# What a value depends on, found by walking up all its inputs
+
+_INSTANCE = {"OBJECT_INFO", "PARTICLE_INFO", "HAIR_INFO", "CURVES_INFO", "POINT_INFO", "TEX_POINTDENSITY"}
+_VIEW = {"FRESNEL", "LAYER_WEIGHT", "CAMERA", "LIGHT_PATH", "AMBIENT_OCCLUSION", "BEVEL", "SHADERTORGB",
+         "RAYCAST"}
+_SURFACE_IF_UNLINKED = "TEX_"
 
 
-def _output(source):
-    node = source.node
-    if node.type == "VALUE":
-        return float(node.outputs[0].default_value)
-    if node.type == "RGB":
-        return _plain(node.outputs[0].default_value)
+def dependencies(socket, groups=()):
+    """What feeds a socket depends on: a set of uv, mapped, surface, instance, view.
+
+    `mapped` says that UVs are moved or procedurals read them, so that values
+    need not repeat with the unit square.
+    """
+    found, seen, todo = set(), set(), [(socket, groups)]
+    while todo:
+        socket, groups = todo.pop()
+        arrived = False
+        while arrived is False:
+            socket, groups, arrived = step(socket, groups)
+        if arrived is None:
+            continue
+        node, key = socket.node, (socket.as_pointer(), tuple(g.as_pointer() for g in groups))
+        if key in seen:
+            continue
+        seen.add(key)
+        found |= _own_dependencies(node, socket)
+        todo += [(s, groups) for s in node.inputs if s.enabled]
+    return found
+
+
+def _own_dependencies(node, socket):
+    if node.type in _VIEW:
+        return {"view"}
+    if node.type in _INSTANCE:
+        return {"instance"}
+    if node.type == "TEX_COORD":
+        if socket.name in {"Camera", "Window", "Reflection"}:
+            return {"view"}
+        if socket.name == "UV":
+            return {"uv"}
+        return {"surface", "instance"} if node.object or node.from_instancer else {"surface"}
+    if node.type == "NEW_GEOMETRY":
+        return {"view"} if socket.name in {"Incoming", "Backfacing"} else {"surface", "instance"}
+    if node.type == "UVMAP":
+        return {"uv"}
+    if node.type in {"ATTRIBUTE", "VERTEX_COLOR", "TANGENT", "WIREFRAME", "UVALONGSTROKE", "NORMAL_MAP",
+                     "BUMP", "SCRIPT", "VOLUME_INFO"}:
+        return {"surface", "instance"} if getattr(node, "attribute_type", "GEOMETRY") != "GEOMETRY" else {"surface"}
     if node.type == "TEX_IMAGE":
-        return _image(source)
-    if node.type == "MATH":
-        return _math(source)
-    if node.type == "RGBTOBW":
-        value = _input(source, 0)
-        if isinstance(value, Texture):
-            return replace(value, channel="luminance")
-        return value if isinstance(value, Unknown) else luminance(value)
-    if node.type in {"SEPRGB", "SEPARATE_COLOR", "SEPXYZ"}:
-        if getattr(node, "mode", "RGB") != "RGB":
-            return Unknown(f"{_describe(node)} in mode {node.mode}")
-        i = list(node.outputs).index(source.socket)
-        value = _input(source, 0)
-        if isinstance(value, Texture):
-            return replace(value, channel="rgb"[i])
-        return value if isinstance(value, Unknown) else value[i]
-    if node.type in {"COMBRGB", "COMBINE_COLOR", "COMBXYZ"}:
-        if getattr(node, "mode", "RGB") != "RGB":
-            return Unknown(f"{_describe(node)} in mode {node.mode}")
-        parts = tuple(_input(source, i) for i in range(3))
-        if all(isinstance(p, float) for p in parts):
-            return parts
-    return Unknown(_describe(node))
-
-
-_MATH = {
-    "ADD": lambda a, b: a + b,
-    "SUBTRACT": lambda a, b: a - b,
-    "MULTIPLY": lambda a, b: a * b,
-    "DIVIDE": lambda a, b: a / b if b else 0.0,
-    "POWER": lambda a, b: a ** b,
-    "SQRT": lambda a, b: math.sqrt(a) if a > 0.0 else 0.0,
-    "MINIMUM": min,
-    "MAXIMUM": max,
-    "ABSOLUTE": lambda a, b: abs(a),
-}
-
-
-def _math(source):
-    node = source.node
-    a, b = _input(source, 0), _input(source, 1)
-    if not (isinstance(a, float) and isinstance(b, float) and node.operation in _MATH):
-        return Unknown(f"{_describe(node)}, {node.operation.lower()}")
-    try:
-        value = float(_MATH[node.operation](a, b))
-    except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-        return Unknown(f"{_describe(node)}, {node.operation.lower()} of {a} and {b}")
-    return min(max(value, 0.0), 1.0) if node.use_clamp else value
-
-
-def _image(source):
-    node = source.node
-    if node.image is None:
-        return Unknown(f"{_describe(node)} without an image")
-    for attribute, only in (("projection", "FLAT"), ("extension", "REPEAT")):
-        if getattr(node, attribute) != only:
-            return Unknown(f"{_describe(node)} with {attribute} {getattr(node, attribute)}")
-    space = node.image.colorspace_settings.name
-    if space == "sRGB":
-        color_space = "srgb"
-    elif space in {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Linear BT.709"}:
-        color_space = "non_color"
-    else:
-        return Unknown(f'image "{node.image.name}" in colour space {space}')
-    texture = Texture(
-        image=node.image,
-        color_space=color_space,
-        interpolation="closest" if node.interpolation == "Closest" else "bilinear",
-        channel="a" if source.socket.name == "Alpha" else None,
-    )
-    return _place(texture, follow(node.inputs["Vector"], source.groups))
-
-
-def _place(texture, vector):
-    """Read scale and offset off a Mapping node, down to the UVs."""
-    if not vector.linked:
-        return texture
-    node = vector.node
-    if node.type == "UVMAP" or (node.type == "TEX_COORD" and vector.socket.name == "UV"):
-        return texture  # that it is the mesh's active UV map is checked per object
-    if node.type == "MAPPING" and node.vector_type == "POINT":
-        location, rotation, scale = (
-            evaluate(node.inputs[name], vector.groups)
-            for name in ("Location", "Rotation", "Scale"))
-        below = follow(node.inputs["Vector"], vector.groups)
-        # An empty Vector input of a Mapping node is (0, 0, 0), not the UVs.
-        if (all(isinstance(v, tuple) for v in (location, rotation, scale))
-                and not any(rotation) and below.linked and below.node.type != "MAPPING"):
-            return _place(replace(texture, scale=scale[:2], offset=location[:2]), below)
-    return Unknown(f"{_describe(node)} as coordinates of an image")
+        if node.projection != "FLAT":
+            return {"surface"}
+        repeats = node.extension == "REPEAT" and not node.inputs["Vector"].is_linked
+        return set() if node.inputs["Vector"].is_linked else ({"uv"} if repeats else {"uv", "mapped"})
+    if node.type.startswith(_SURFACE_IF_UNLINKED):
+        vector = node.inputs.get("Vector")
+        linked = vector is not None and vector.is_linked
+        return {"mapped"} if linked else {"surface"}
+    if node.type in {"MAPPING", "VECT_MATH", "VECTOR_ROTATE", "CURVE_VEC", "COMBXYZ", "SEPXYZ"}:
+        return {"mapped"}
+    return set()
 
 
 def uv_map_names(tree):

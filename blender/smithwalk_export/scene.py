@@ -6,19 +6,44 @@ own, for Blender hands an engine the scene as it is to be rendered.
 """
 
 import os
+import sys
+import time
 
 import bpy
 
-from . import lights, yaml
+from . import cycles, lights, settings, yaml
+from .audit import DEFAULTS, Audit
+from .bake import Baker
+from .files import Folder
 from .images import ImageWriter
 from .log import Log
-from .materials import MaterialWriter
+from .lower import lower
+from .materials import MaterialWriter, asks_for_uv_maps
 from .meshes import MeshWriter
+from .world import WorldWriter
 
 FORMAT_VERSION = 1
+BAKE_SIZE = 1024
+# What only Cycles can evaluate is baked by it; taken from earlier bakes; left out and named.
+BAKE, CACHED, NO_BAKE = "bake", "cached", "no bake"
 # Curves, text and metaballs come with an instance of type MESH, their tessellation.
 _SILENT = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE",
            "CURVE", "SURFACE", "FONT", "META"}
+# Properties of objects whose say reaches the scene by the world matrix, the
+# evaluated mesh, visibility in the depsgraph, or the nodes that read them.
+_CONVEYED = (
+    "type", "data", "parent", "parent_type", "parent_bone", "parent_vertices", "track_axis", "up_axis",
+    "location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler", "rotation_mode", "scale",
+    "dimensions", "delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale",
+    "matrix_world", "matrix_local", "matrix_basis", "matrix_parent_inverse", "pass_index", "color",
+    "hide_render", "instance_type", "instance_collection", "use_instance_vertices_rotation",
+    "use_instance_faces_scale", "instance_faces_scale", "visible_volume_scatter", "field", "collision",
+    "soft_body", "rigid_body", "rigid_body_constraint", "active_material", "cycles.motion_steps",
+    "cycles.use_motion_blur", "cycles.use_deform_motion", "cycles.use_camera_cull", "cycles.use_distance_cull",
+    "proxy_collection", "track_axis", "add_rest_position_attribute", "use_dynamic_topology_sculpting",
+    "cycles.use_adaptive_subdivision", "cycles.dicing_rate",
+)
+_RAYS = ("diffuse", "glossy", "transmission", "shadow")
 
 
 class ExportError(Exception):
@@ -33,196 +58,359 @@ class _Engine(bpy.types.RenderEngine):
 
     job = None     # called with the depsgraph
     error = None   # what it raised: Blender would print it and go on
+    layer = None   # the view layer that is wanted, None for the first
 
     def render(self, depsgraph):
         """Called by Blender for each view layer."""
         cls = type(self)
-        if cls.job is None:
+        if cls.job is None or cls.layer not in {None, depsgraph.view_layer.name}:
             return
         job, cls.job = cls.job, None
         try:
             job(depsgraph)
-        except Exception as error:  # re-raised by `export`
+        except Exception as error:  # raised again by `_with_depsgraph`
             cls.error = error
 
 
-def export(scene, folder):
-    """Write `scene` to `folder`/scene.yaml; returns the Log. Raises ExportError."""
-    try:
-        os.makedirs(folder, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{folder} can't be written: {error.strerror}") from error
-
-    log = Log()
+def _with_depsgraph(scene, layer, job):
+    """Call `job` with the depsgraph of a final render; returns what it returned."""
     render = scene.render
     # What would otherwise happen around an engine's own work.
     changed = {"engine": _Engine.bl_idname, "use_compositing": False, "use_sequencer": False,
-               "use_border": False}
-    if render.use_border:
-        log.warn("scene", "the render region is left out: the whole frame is written")
+               "use_border": False, "use_multiview": False}
     kept = {name: getattr(render, name) for name in changed}
-    ran = []
+    result, ran = [], []
 
-    def job(depsgraph):
+    def called(depsgraph):
         ran.append(True)
-        _write(scene, depsgraph, folder, log)
+        result.append(job(depsgraph))
 
+    stand_in = None
+    if scene.camera is None:  # Blender does not render without; the export tells it
+        stand_in = bpy.data.objects.new("smithwalk", bpy.data.cameras.new("smithwalk"))
+        scene.collection.objects.link(stand_in)
+        scene.camera = stand_in
     bpy.utils.register_class(_Engine)
     try:
-        _Engine.job, _Engine.error = job, None
+        _Engine.job, _Engine.error, _Engine.layer = called, None, layer
         for name, value in changed.items():
             setattr(render, name, value)
-        bpy.ops.render.render(scene=scene.name)
+        with cycles.quiet_handlers():
+            bpy.ops.render.render(scene=scene.name)
     finally:
         for name, value in kept.items():
             setattr(render, name, value)
         bpy.utils.unregister_class(_Engine)
+        if stand_in is not None:
+            data = stand_in.data
+            bpy.data.objects.remove(stand_in)
+            bpy.data.cameras.remove(data)
     if _Engine.error is not None:
         raise _Engine.error
     if not ran:
-        raise ExportError("Blender did not hand over the scene to be rendered (is there a camera?)")
-    return log
+        raise ExportError("Blender did not hand over the scene to be rendered"
+                          + (f' (is there a view layer "{layer}" that is used for rendering?)' if layer else ""))
+    return result[0]
 
 
-def _write(scene, depsgraph, folder, log):
-    meshes = MeshWriter(folder)
-    images = ImageWriter(folder, log)
-    materials = MaterialWriter(images, log)
-    objects, lamps = _objects(depsgraph, meshes, materials, log)
-    if not objects:
-        log.warn("scene", "has no surfaces")
-    if scene.render.use_motion_blur:
-        log.warn("scene", "motion blur is left out")
-
-    sections = {
-        "smithwalk": FORMAT_VERSION,
-        "light_units": lights.light_units(),
-        "camera": lights.camera(scene, depsgraph, log),
-        "film": _film(scene, log),
-        "sampling": _sampling(scene, log),
-        "world": lights.world(scene, images, log),
-        "textures": materials.textures,
-        "materials": materials.materials,
-        "meshes": {name: {"file": file} for name, file in meshes.files.items()},
-        "objects": objects,
-        "lights": lamps,
-    }
-    sections = {k: v for k, v in sections.items() if v not in (None, {}, [])}
-    path = os.path.join(folder, "scene.yaml")
-    with open(path, "w", encoding="utf-8") as f:
-        f.write(yaml.document(sections, note=scene.get("smithwalk_note")))
-    log.path = path
-    for kind in ("objects", "lights", "meshes", "materials", "textures"):
-        log.count(kind, len(sections.get(kind, ())))
+def progress_to_terminal(what, share):
+    """A line on standard error, where that is a terminal; else only the steps' names."""
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{what} {100 * share:3.0f} %", end="\n" if share >= 1.0 else "", file=sys.stderr, flush=True)
 
 
-def _objects(depsgraph, meshes, materials, log):
-    """Objects and lights, every instance on its own with its world matrix."""
-    objects, lamps = [], []
-    for instance in depsgraph.object_instances:
-        ob = instance.object
-        if not instance.show_self:  # e.g. an emitter hidden behind its instances
-            continue
-        where = f'object "{ob.name}"'
-        if ob.type == "LIGHT":
-            lamp = lights.light(ob, instance.matrix_world.copy(), log)
-            if lamp:
-                lamps.append(lamp)
-        elif ob.type == "MESH":
+class Job:
+    """One export: what it needs to know, and the parts that write."""
+
+    def __init__(self, scene, folder, log=None, bake=BAKE, bake_size=BAKE_SIZE, layer=None,
+                 progress=progress_to_terminal):
+        self.scene = scene
+        self.folder = folder
+        self.log = log or Log()
+        self.audit = Audit()
+        self.layer = layer
+        self.progress = progress
+        self.composited = settings.has_compositor(scene)
+        self.border = scene.render.use_border
+        self.has_camera = scene.camera is not None
+        self.bake = bake
+        self.baker = Baker(bake_size, bake == BAKE, self.log, progress)
+        self.materials = MaterialWriter(None, self.log, self.audit)
+        view_layer = scene.view_layers.get(layer) if layer else next(
+            (l for l in scene.view_layers if l.use), scene.view_layers[0])
+        if view_layer is None:
+            raise ExportError(f'no view layer "{layer}": there is '
+                              + ", ".join(f'"{l.name}"' for l in scene.view_layers))
+        self.world = WorldWriter(scene, view_layer, Audit(), self.log, bake == BAKE, progress)
+        self._sites = {}
+
+    def prepare(self):
+        """What takes renders of its own: defaults of all structs, the world, bakes."""
+        DEFAULTS.prepare()
+        if self.bake == NO_BAKE:
+            return
+        self.world.prepare()
+        if any(self._needs(m).requests or asks_for_uv_maps(m) for m in bpy.data.materials if m.users):
+            _with_depsgraph(self.scene, self.layer, self.plan)
+            self.baker.run()
+
+    def _needs(self, material):
+        return self.materials.needs(material)
+
+    def plan(self, depsgraph):
+        """Register the bakes of all objects."""
+        for ob, matrix, slots, materials in self._surfaces(depsgraph):
+            needs = self._object_needs(ob, materials)
+            if any(n.requests or n.surface for n in needs):
+                self.baker.plan(ob, matrix, materials, needs, depsgraph)
+
+    def _object_needs(self, ob, materials):
+        """Needs by slot; maps other than the active one are brought to it by a bake."""
+        needs = [self._needs(m) for m in materials]
+        active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
+        asked = set().union(*(asks_for_uv_maps(m) for m in materials)) if materials else set()
+        if (asked & set(l.name for l in ob.data.uv_layers)) - {active} and not any(n.surface for n in needs):
+            forced = [type(n)(dict(n.requests), dict(n.textures)) for n in needs]
+            for n in forced:
+                if n.textures:
+                    n.requests.update({r: d | {"surface"} for r, d in n.textures.items()})
+            return forced
+        return needs
+
+    def _surfaces(self, depsgraph):
+        """Each evaluated mesh object once: (object, matrix, used slots, materials by used slot)."""
+        seen = set()
+        for instance in depsgraph.object_instances:
+            ob = instance.object
+            if ob.type != "MESH" or not instance.show_self or not len(ob.data.polygons):
+                continue
+            key = (ob.name_full, ob.data.as_pointer())
+            if key in seen:
+                continue
+            seen.add(key)
+            slots = _used_slots(ob.data)
+            yield ob, instance.matrix_world.copy(), slots, [self._slot_material(ob, i, depsgraph) for i in slots]
+
+    def _slot_material(self, ob, index, depsgraph):
+        """The material of a slot: the view layer's override, the object's own, or the mesh's."""
+        override = depsgraph.view_layer.material_override
+        if override is not None:
+            return override
+        slots = ob.material_slots
+        if index < len(slots) and slots[index].link == "OBJECT":
+            return slots[index].material
+        mesh_materials = ob.data.materials
+        return mesh_materials[index] if index < len(mesh_materials) else None
+
+    # Writing
+
+    def write(self, depsgraph):
+        """Write the scene that a depsgraph of a final render holds; returns the log."""
+        files = Folder(self.folder)
+        try:
+            return self._write(depsgraph, files)
+        finally:
+            files.close()
+
+    def _write(self, depsgraph, files):
+        scene, log = self.scene, self.log
+        images = ImageWriter(files, log)
+        self.materials.images = images
+        meshes = MeshWriter(files, log)
+        objects, lamps = self._objects(depsgraph, meshes)
+        if not objects:
+            log.note("scene", "has no surfaces")
+        world, suns = self.world.section(images)
+        lamps += suns
+        for name, material in self.materials.materials.items():
+            self.materials.materials[name] = lower(
+                material, lambda what, name=name: log.warn(f'material "{name}"', what))
+        render = scene.render
+        border, render.use_border = render.use_border, self.border
+        try:
+            settings.tell(scene, depsgraph.view_layer, self.audit, log, self.composited)
+            options = settings.options(scene)
+        finally:
+            render.use_border = border
+        others = [l.name for l in scene.view_layers if l.use and l.name != depsgraph.view_layer.name]
+        if others:
+            log.warn("scene", f'only view layer "{depsgraph.view_layer.name}" is written, not '
+                              + ", ".join(f'"{n}"' for n in others))
+
+        sections = {
+            "smithwalk": FORMAT_VERSION,
+            "light_units": lights.light_units(),
+            "camera": lights.camera(scene, depsgraph, self.audit, log) if self.has_camera
+            else lights.camera(_NoCamera, depsgraph, self.audit, log),
+            "film": settings.film(scene, log),
+            "sampling": settings.sampling(scene, depsgraph.view_layer),
+            "world": world,
+            "textures": self.materials.textures,
+            "materials": self.materials.materials,
+            "meshes": {name: {"file": file} for name, file in meshes.meshes.items()},
+            "objects": objects,
+            "lights": lamps,
+        }
+        sections = {k: v for k, v in sections.items() if v not in (None, {}, [])}
+        note = scene.get("smithwalk_note") or ""
+        if options:
+            note += ("\n" if note else "") + "Blender's settings as options of `smithwalk render`: " + " ".join(options)
+        log.path = files.commit(yaml.document(sections, note=note))
+        log.options = options
+        for kind in ("objects", "lights", "meshes", "materials", "textures"):
+            log.count(kind, len(sections.get(kind, ())))
+        return log
+
+    def _objects(self, depsgraph, meshes):
+        """Objects and lights, every instance on its own with its world matrix."""
+        objects, lamps = [], []
+        lamp_writer = lights.LightWriter(self.audit, self.log)
+        audited = set()
+        last = time.monotonic()
+        total = len(depsgraph.object_instances)
+        for i, instance in enumerate(depsgraph.object_instances):
+            if time.monotonic() - last > 0.2:
+                last = time.monotonic()
+                self.progress("exporting", i / total)
+            ob = instance.object
+            where = f'object "{ob.name}"'
+            if not instance.is_instance and any(
+                    m.type == "PARTICLE_SYSTEM" and m.show_render and m.particle_system
+                    and m.particle_system.settings.type == "HAIR"
+                    and m.particle_system.settings.render_type == "PATH" for m in ob.modifiers):
+                self.log.wrong(where, "its hair is missing")
+            if not instance.show_self:  # e.g. an emitter hidden behind its instances
+                continue
             # The iterator reuses the instance: copy before going on.
-            entry = _object(ob, instance.matrix_world.copy(), meshes, materials, log, where)
-            if entry:
-                objects.append(entry)
-        elif ob.type not in _SILENT:
-            log.warn(where, f"a {ob.type.lower()} can't be carried")
-    return objects, lamps
+            matrix = instance.matrix_world.copy()
+            if ob.type == "LIGHT":
+                lamp = lamp_writer.add(ob, matrix)
+                if lamp:
+                    lamps.append(lamp)
+            elif ob.type == "MESH":
+                entry = self._object(ob, matrix, meshes, depsgraph, where)
+                if entry:
+                    objects.append(entry)
+                else:
+                    continue
+            elif ob.type not in _SILENT:
+                self.log.wrong(where, f"a {ob.type.lower().replace('_', ' ')} is missing")
+                continue
+            else:
+                continue
+            if ob.name_full not in audited:
+                audited.add(ob.name_full)
+                self._audit_object(ob, depsgraph.view_layer, where)
+        self.progress("exporting", 1.0)
+        return objects, lamps
+
+    def _audit_object(self, ob, view_layer, where):
+        """Name what of an object is another picture and was not carried."""
+        view = self.audit.view(ob)
+        view.accept(*_CONVEYED)
+        hidden = [kind for kind in _RAYS if not getattr(view, f"visible_{kind}")]
+        if hidden:
+            self.log.warn(where, f"hidden from {' and '.join(hidden)} rays in Blender, visible here")
+        view.accept("visible_camera", "is_holdout", "is_shadow_catcher")
+        if ob.is_holdout or ob.original.holdout_get(view_layer=view_layer):
+            self.log.warn(where, "holdout is left out: the object is seen")
+        if ob.is_shadow_catcher and ob.type != "LIGHT":  # lights have the flag by default
+            self.log.warn(where, "shadow catcher is left out: the object is seen")
+        for what in self.audit.leftovers(ob):
+            self.log.warn(where, f"{what}: left out")
+
+    def _object(self, ob, matrix, meshes, depsgraph, where):
+        if not len(ob.data.polygons):
+            return None
+        if not lights.is_finite(matrix):
+            self.log.note(where, "its matrix is not finite: left out")
+            return None
+        transform = None
+        largest = max(c.length for c in matrix.to_3x3().col)
+        if abs(matrix.to_3x3().determinant()) <= 1e-6 * 1e-6 * largest ** 3 or largest < 1e-6:
+            rank = _rank(matrix)
+            if rank < 2:
+                self.log.note(where, "has no extent (scale 0): left out")
+                return None
+            transform = matrix  # a flattened object: its scale goes into the vertices
+        slots = _used_slots(ob.data)
+        materials = [self._slot_material(ob, i, depsgraph) for i in slots]
+        needs = self._object_needs(ob, materials)
+        sites, uv = [None] * len(slots), None
+        if any(n.requests for n in needs):
+            key = (ob.name_full, ob.data.as_pointer())
+            if key not in self._sites:
+                self._sites[key] = self.baker.site(ob, matrix, materials, needs)
+            sites, uv = self._sites[key]
+        written = meshes.add(ob, uv, transform, lambda share: self.progress(f"exporting {ob.name}", share))
+        if written is None:
+            return None
+        mesh, used = written
+        chosen = [(materials[slots.index(i)], sites[slots.index(i)]) for i in used]
+        names = [self.materials.add(m, s) for m, s in chosen]
+        entry = {"name": ob.name, "mesh": mesh}
+        if len(names) == 1:
+            entry["material"] = names[0]
+        else:
+            entry["materials"] = {f"slot_{i}": name for i, name in zip(used, names)}
+        if transform is None:
+            entry["transform"] = lights.matrix(matrix)
+        original = ob.original
+        if not ob.visible_camera or original.indirect_only_get(view_layer=depsgraph.view_layer):
+            entry["visible_to_camera"] = False
+        if uv is None:
+            self._check_coordinates(ob, materials, where)
+        self._check_tangents(ob, names, where)
+        return entry
+
+    def _check_coordinates(self, ob, materials, where):
+        """Name UV maps that are asked for and are not the one that is written."""
+        active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
+        here = {l.name for l in ob.data.uv_layers}
+        for name in sorted(set().union(*(asks_for_uv_maps(m) for m in materials)) - {active}):
+            if name in here:
+                self.log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
+
+    def _check_tangents(self, ob, names, where):
+        """Blender's radial tangents turn about the middle of the bounding box, in coordinates
+        scaled by it; the renderer's turn about an axis through the middle, unscaled."""
+        corners = [tuple(c) for c in ob.bound_box]
+        extent = [max(c[i] for c in corners) - min(c[i] for c in corners) for i in range(3)]
+        middle = [max(c[i] for c in corners) + min(c[i] for c in corners) for i in range(3)]
+        size = max(extent)
+        for axis in sorted(set().union(*(self.materials.radial_axes[n] for n in names))):
+            i, j = (k for k in range(3) if k != "xyz".index(axis))
+            if abs(extent[i] - extent[j]) > 1e-3 * size or max(abs(middle[i]), abs(middle[j])) > 1e-3 * size:
+                self.log.warn(where, f"its radial tangent turns about the object's {axis} axis, "
+                                     "Blender's about the bounding box")
 
 
-def _object(ob, world_matrix, meshes, materials, log, where):
-    written = meshes.add(ob)
-    if written is None:
-        return None
-    mesh, slots = written
-    names = [materials.add(_slot_material(ob, i)) for i in slots]
-    entry = {"name": ob.name, "mesh": mesh}
-    if len(names) == 1:
-        entry["material"] = names[0]
-    else:
-        entry["materials"] = {f"slot_{i}": name for i, name in zip(slots, names)}
-    entry["transform"] = lights.matrix(world_matrix)
-    if not ob.visible_camera:
-        entry["visible_to_camera"] = False
-    for kind in ("diffuse", "glossy", "transmission", "shadow"):
-        if not getattr(ob, f"visible_{kind}"):
-            log.warn(where, f"hidden from {kind} rays in Blender, visible here")
-    for flag in ("is_holdout", "is_shadow_catcher"):
-        if getattr(ob, flag, False):
-            log.warn(where, f"{flag[3:].replace('_', ' ')} is left out")
-    if any(m.type == "PARTICLE_SYSTEM" and m.particle_system.settings.render_type == "PATH"
-           for m in ob.modifiers):
-        log.warn(where, "hair particles are left out")
-    _check_coordinates(ob, names, materials, log, where)
-    return entry
+class _NoCamera:
+    """Stands for a scene without a camera."""
+
+    camera = None
 
 
-def _slot_material(ob, index):
-    """The material of a slot: the object's own if the slot is linked to it, else the mesh's."""
-    slots = ob.material_slots
-    if index < len(slots) and slots[index].link == "OBJECT":
-        return slots[index].material
-    mesh_materials = ob.data.materials
-    return mesh_materials[index] if index < len(mesh_materials) else None
+def _used_slots(mesh):
+    import numpy as np
+    slots = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", slots)
+    return [int(s) for s in np.unique(np.clip(slots, 0, max(len(mesh.materials) - 1, 0)))]
 
 
-def _check_coordinates(ob, names, materials, log, where):
-    """Name where UVs or tangents of this object differ from Blender's."""
-    active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
-    wanted = set().union(*(materials.uv_maps[n] for n in names))
-    for name in sorted(wanted - {active}):
-        log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
-    # Blender's radial tangents turn about the middle of the bounding box, in
-    # coordinates scaled by it; the renderer's turn about the object's axis.
-    corners = [tuple(c) for c in ob.bound_box]
-    low = [min(c[i] for c in corners) for i in range(3)]
-    high = [max(c[i] for c in corners) for i in range(3)]
-    size = max(h - l for l, h in zip(low, high))
-    for axis in sorted(set().union(*(materials.radial_axes[n] for n in names))):
-        i, j = (k for k in range(3) if k != "xyz".index(axis))
-        off_axis = max(abs(low[k] + high[k]) for k in (i, j)) > 1e-3 * size
-        uneven = abs((high[i] - low[i]) - (high[j] - low[j])) > 1e-3 * size
-        if off_axis or uneven:
-            log.warn(where, f"its radial tangent turns about the object's {axis} axis, "
-                            "Blender's about the bounding box")
+def _rank(matrix):
+    import numpy as np
+    values = np.linalg.svd(np.array(matrix.to_3x3()), compute_uv=False)
+    return int((values > max(values.max() * 1e-6, 1e-9)).sum())
 
 
-def _film(scene, log):
-    render = scene.render
-    percent = render.resolution_percentage / 100.0
-    film = {"width": max(int(render.resolution_x * percent), 1),
-            "height": max(int(render.resolution_y * percent), 1)}
-    kind = scene.cycles.pixel_filter_type
-    if kind == "BOX":
-        film["filter"] = {"box": {}}
-    else:
-        if kind != "BLACKMAN_HARRIS":
-            log.warn("scene", f"pixel filter {kind.lower()} is written as Blackman-Harris")
-        film["filter"] = {"blackman_harris": {"width": scene.cycles.filter_width}}
-    if scene.view_settings.exposure != 0.0:
-        film["exposure"] = scene.view_settings.exposure
-    if scene.cycles.film_exposure != 1.0:
-        log.warn("scene", "Cycles' film exposure is left out (it would scale the EXR)")
-    if render.film_transparent:
-        log.warn("scene", "transparent film is left out")
-    return film
-
-
-def _sampling(scene, log):
-    cycles = scene.cycles
-    bounces = cycles.max_bounces
-    lower = [f"{kind} {getattr(cycles, f'{kind}_bounces')}" for kind in ("diffuse", "glossy", "transmission")
-             if getattr(cycles, f"{kind}_bounces") < bounces]
-    if lower:
-        log.warn("scene", f"bounce limits per kind are left out ({', '.join(lower)}): {bounces} for all")
-    if cycles.sample_clamp_direct or cycles.sample_clamp_indirect:
-        log.warn("scene", "clamping of samples is left out")
-    return {"spp": cycles.samples, "seed": cycles.seed, "max_bounces": bounces}
+def export(scene, folder, bake=BAKE, bake_size=BAKE_SIZE, layer=None, progress=progress_to_terminal):
+    """Write `scene` to `folder`/scene.yaml; returns the Log. Raises ExportError."""
+    try:
+        os.makedirs(folder, exist_ok=True)
+        job = Job(scene, folder, bake=bake, bake_size=bake_size, layer=layer, progress=progress)
+        job.prepare()
+        return _with_depsgraph(scene, layer, job.write)
+    except OSError as error:
+        raise ExportError(f"{folder} can't be written: {error.strerror or error} "
+                          f"({error.filename})" if error.filename else str(error)) from error

@@ -7,16 +7,21 @@ booleans and strings only.
 import json
 import math
 import re
+import struct
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*\Z")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
 def number(x):
-    """A float in seven significant digits (what a float32 property holds)."""
+    """A float in up to nine significant digits: every float32 survives exactly."""
     if not math.isfinite(x):
         raise ValueError(f"{x} can't be written to a scene")
-    text = f"{x:.7g}"
+    text = f"{x:.9g}"
+    if abs(x) < 3e38:  # the shortest that is the same float32
+        single = struct.pack("f", x)
+        text = next((t for t in (f"{x:.6g}", f"{x:.7g}", f"{x:.8g}")
+                     if struct.pack("f", float(t)) == single), text)
     return "0" if text == "-0" else text
 
 
