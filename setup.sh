@@ -7,9 +7,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 
 usage() {
     cat <<'END'
-usage: ./setup.sh [--with-lints] [--with-blender]
+usage: ./setup.sh [--with-lints] [--with-python] [--with-blender]
 
   --with-lints     also cargo fmt and cargo clippy
+  --with-python    also what builds and tests the Python package
   --with-blender   also the distribution's Blender, for reference renders and
                    the tests of the exporter
 
@@ -24,10 +25,11 @@ WHEEL=embreex==4.4.0.post1
 WHEEL_SHA256=2cd0f7d5c6342e6247e31f700761689cae7829454d8c6de0c41e62124a023e1f
 PRIVATE=.deps/embree
 
-lints=false blender=false
+lints=false python=false blender=false
 for option in "$@"; do
     case $option in
         --with-lints) lints=true ;;
+        --with-python) python=true ;;
         --with-blender) blender=true ;;
         -h | --help) usage && exit 0 ;;
         *) usage >&2 && exit 2 ;;
@@ -80,6 +82,9 @@ packages=() need_cargo=false need_embree=false
 libclang_is_here || packages+=(libclang-dev)
 embree_is_here || need_embree=true
 cargo_is_here || need_cargo=true
+if $python; then
+    python3 -c 'import ensurepip, venv' 2>/dev/null || packages+=(python3 python3-venv)
+fi
 if $blender; then
     has blender || packages+=(blender)
     # For the distribution's Blender, which runs the distribution's Python.

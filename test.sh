@@ -11,7 +11,7 @@ stage() {
     shift
     printf '\n== %s\n' "$name"
     "$@" || { outcome=FAILED && failed+=("$name"); }
-    times+=("$(printf '%5d s  %-13s %s' $((SECONDS - begin)) "$name" $outcome)")
+    times+=("$(printf '%5d s  %-14s %s' $((SECONDS - begin)) "$name" $outcome)")
 }
 
 results=$(mktemp)
@@ -20,9 +20,17 @@ documentation() { RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps; }
 tests() { cargo test --workspace --no-fail-fast 2>&1 | tee "$results"; }
 scripts() { find . \( -path ./target -o -path ./.deps -o -path ./.git \) -prune -o "$@" -print0; }
 shell_syntax() { scripts -name '*.sh' | xargs -0 -n 1 bash -n && bash -n .ci/run; }
+# The Python package as users get it: a wheel in a virtual environment with numpy alone.
+python_package() {
+    local venv=target/python
+    { [[ -x $venv/bin/maturin ]] || { python3 -m venv $venv && $venv/bin/pip install -q maturin pytest numpy; }; } &&
+        rm -rf $venv/wheel && $venv/bin/maturin build -m python/Cargo.toml --out $venv/wheel &&
+        $venv/bin/pip install -q --force-reinstall --no-deps $venv/wheel/*.whl &&
+        $venv/bin/python -m pytest -q python/tests
+}
 python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
 
-stage set-up ./setup.sh --with-lints --with-blender
+stage set-up ./setup.sh --with-lints --with-python --with-blender
 [[ ${#failed[@]} -eq 0 ]] || exit 1
 stage shell shell_syntax
 stage python python_syntax
@@ -30,6 +38,7 @@ stage format cargo fmt --all --check
 stage clippy cargo clippy --locked --workspace --all-targets -- -D warnings
 stage documentation documentation
 stage tests tests
+stage python-package python_package
 
 printf '\n== summary\n'
 grep '^test result:' "$results"

@@ -1,0 +1,324 @@
+//! Surfaces as Python makes them: every distribution with every kind of facet.
+
+use numpy::ndarray::{Array1, Array2, Array3};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rand_pcg::Pcg64Mcg;
+use smithwalk_model::{
+    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Exit, Facets, Ggx,
+    Microsurface, Ndf, PerOrder, Quadratic, Rgb, Stream, Total, Vector3,
+};
+
+use crate::measure::{self, Albedo};
+
+/// The generator that each point has one of.
+pub type Rng = Stream<Pcg64Mcg>;
+
+/// How f is estimated.
+#[derive(Clone, Copy)]
+pub enum Method {
+    /// All orders.
+    Orders(Estimator),
+    /// The first order alone.
+    Single,
+}
+
+/// A microsurface seen from above, of whichever distribution and facets.
+pub trait Scatter: Send + Sync {
+    /// One estimate of f |cosθ_o|, sr⁻¹, all orders together.
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64>;
+    /// The same, order by order, added to `orders`.
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    );
+    /// One walk.
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>>;
+    /// The proxy density, sr⁻¹.
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64;
+}
+
+impl<N, I> Scatter for Microsurface<N, I>
+where
+    N: Ndf<Scalar = f64> + Send + Sync,
+    I: Facets<Scalar = f64> + Send + Sync,
+{
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64> {
+        match method {
+            Method::Single => self.eval_single(wi, wo, rng),
+            Method::Orders(estimator) => {
+                let mut total = Total::default();
+                Microsurface::eval(self, estimator, wi, wo, rng, &mut total);
+                total.0
+            }
+        }
+    }
+
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    ) {
+        Microsurface::eval(self, estimator, wi, wo, rng, orders);
+    }
+
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>> {
+        Microsurface::sample(self, wi, rng)
+    }
+
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
+        Microsurface::pdf(self, wi, wo)
+    }
+}
+
+/// A rough surface.
+#[pyclass(frozen)]
+pub struct Surface {
+    above: Box<dyn Scatter>,
+    /// Seen from the other side; absent where nothing comes through.
+    below: Option<Box<dyn Scatter>>,
+}
+
+impl Surface {
+    /// The surface as `wi` sees it, and whether that is from below: then z is
+    /// mirrored. Light on the opaque side meets nothing.
+    pub fn seen_from(&self, wi: Vector3<f64>) -> Option<(&dyn Scatter, bool)> {
+        if wi.z > 0.0 {
+            Some((&*self.above, false))
+        } else {
+            self.below.as_deref().map(|below| (below, true))
+        }
+    }
+
+    fn with<I>(distribution: &str, alpha: [f64; 2], facets: I) -> PyResult<Self>
+    where
+        I: Facets<Scalar = f64> + Send + Sync + 'static,
+    {
+        let [alpha_x, alpha_y] = alpha;
+        match distribution {
+            "ggx" => Ok(Self::of(Ggx { alpha_x, alpha_y }, facets)),
+            "beckmann" => Ok(Self::of(Beckmann { alpha_x, alpha_y }, facets)),
+            "quadratic" => Ok(Self::of(Quadratic::new(), facets)),
+            other => Err(PyValueError::new_err(format!(
+                "distribution: expected 'ggx', 'beckmann' or 'quadratic', found {other:?}"
+            ))),
+        }
+    }
+
+    fn of<N, I>(ndf: N, facets: I) -> Self
+    where
+        N: Ndf<Scalar = f64> + Send + Sync + 'static,
+        I: Facets<Scalar = f64> + Send + Sync + 'static,
+    {
+        Self {
+            above: Box::new(Microsurface { ndf, facets }),
+            below: I::TRANSMITS.then(|| {
+                let facets = facets.inverted();
+                Box::new(Microsurface { ndf, facets }) as Box<dyn Scatter>
+            }),
+        }
+    }
+}
+
+fn method(name: &str) -> PyResult<Method> {
+    Ok(match name {
+        "auto" | "position-free" => Method::Orders(Estimator::PositionFree),
+        "two-walk" => Method::Orders(Estimator::TwoWalk),
+        "walk" => Method::Orders(Estimator::Walk),
+        "single" => Method::Single,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "estimator: expected 'auto', 'position-free', 'two-walk', 'walk' or 'single', found {other:?}"
+            )));
+        }
+    })
+}
+
+/// Rows of three numbers as vectors.
+fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<Vector3<f64>> {
+    let rows = rows.as_array();
+    rows.rows()
+        .into_iter()
+        .map(|row| Vector3::new(row[0], row[1], row[2]))
+        .collect()
+}
+
+type Columns<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+type Blocks<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
+type Samples<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<u32>>,
+);
+
+fn columns<'py>(py: Python<'py>, found: Vec<measure::Estimate>) -> Columns<'py> {
+    let array = |value: fn(&measure::Estimate) -> [f64; 3]| {
+        let flat: Vec<f64> = found.iter().flat_map(value).collect();
+        let rows = Array2::from_shape_vec((found.len(), 3), flat);
+        rows.expect("three channels each").into_pyarray(py)
+    };
+    (array(|e| e.mean), array(|e| e.standard_error))
+}
+
+#[pymethods]
+impl Surface {
+    #[staticmethod]
+    fn conductor_color(distribution: &str, alpha: [f64; 2], color: [f64; 3]) -> PyResult<Self> {
+        let fresnel = ConductorFresnel::Constant(Rgb(color));
+        Self::with(distribution, alpha, Conductor { fresnel })
+    }
+
+    #[staticmethod]
+    fn conductor_complex(
+        distribution: &str,
+        alpha: [f64; 2],
+        eta: [f64; 3],
+        k: [f64; 3],
+    ) -> PyResult<Self> {
+        let fresnel = ConductorFresnel::Complex {
+            eta: Rgb(eta),
+            k: Rgb(k),
+        };
+        Self::with(distribution, alpha, Conductor { fresnel })
+    }
+
+    #[staticmethod]
+    fn dielectric(distribution: &str, alpha: [f64; 2], eta: f64, tint: [f64; 3]) -> PyResult<Self> {
+        let tint = Rgb(tint);
+        Self::with(distribution, alpha, Dielectric { eta, tint })
+    }
+
+    #[staticmethod]
+    fn diffuse(distribution: &str, alpha: [f64; 2], albedo: [f64; 3]) -> PyResult<Self> {
+        let albedo = Rgb(albedo);
+        Self::with(distribution, alpha, Diffuse { albedo })
+    }
+
+    fn eval<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'py, f64>,
+        wo: PyReadonlyArray2<'py, f64>,
+        estimator: &str,
+        samples: u64,
+        seed: u64,
+    ) -> PyResult<Columns<'py>> {
+        let method = method(estimator)?;
+        let (wi, wo) = (vectors(&wi), vectors(&wo));
+        let found = py.detach(|| measure::eval(self, method, &wi, &wo, samples, seed));
+        Ok(columns(py, found))
+    }
+
+    #[allow(clippy::too_many_arguments)] // as Python calls it
+    fn eval_orders<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'py, f64>,
+        wo: PyReadonlyArray2<'py, f64>,
+        estimator: &str,
+        orders: usize,
+        samples: u64,
+        seed: u64,
+    ) -> PyResult<Blocks<'py>> {
+        let Method::Orders(estimator) = method(estimator)? else {
+            return Err(PyValueError::new_err(
+                "estimator: 'single' has one order; use eval",
+            ));
+        };
+        let (wi, wo) = (vectors(&wi), vectors(&wo));
+        let found =
+            py.detach(|| measure::eval_orders(self, estimator, &wi, &wo, orders, samples, seed));
+        let array = |value: fn(&measure::Estimate) -> [f64; 3]| {
+            let flat: Vec<f64> = found.iter().flatten().flat_map(value).collect();
+            let blocks = Array3::from_shape_vec((wi.len(), orders, 3), flat);
+            blocks.expect("three channels each").into_pyarray(py)
+        };
+        Ok((array(|e| e.mean), array(|e| e.standard_error)))
+    }
+
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'py, f64>,
+        seed: u64,
+    ) -> Samples<'py> {
+        let wi = vectors(&wi);
+        let found = py.detach(|| measure::sample(self, &wi, seed));
+        let rows = |value: fn(&measure::Sample) -> [f64; 3]| {
+            let flat: Vec<f64> = found.iter().flat_map(value).collect();
+            let rows = Array2::from_shape_vec((found.len(), 3), flat);
+            rows.expect("three components each").into_pyarray(py)
+        };
+        let orders: Array1<u32> = found.iter().map(|s| s.order).collect();
+        (
+            rows(|s| s.direction),
+            rows(|s| s.weight),
+            orders.into_pyarray(py),
+        )
+    }
+
+    fn pdf<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'py, f64>,
+        wo: PyReadonlyArray2<'py, f64>,
+    ) -> Bound<'py, PyArray1<f64>> {
+        let (wi, wo) = (vectors(&wi), vectors(&wo));
+        let found = py.detach(|| measure::pdf(self, &wi, &wo));
+        Array1::from_vec(found).into_pyarray(py)
+    }
+
+    /// Reflected and transmitted shares with their standard errors, the share
+    /// of each order, and the mean order, of walks from each direction.
+    #[allow(clippy::type_complexity)] // six columns, named on the other side
+    fn albedo<'py>(
+        &self,
+        py: Python<'py>,
+        wi: PyReadonlyArray2<'py, f64>,
+        orders: usize,
+        samples: u64,
+        seed: u64,
+    ) -> (
+        Columns<'py>,
+        Columns<'py>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray1<f64>>,
+    ) {
+        let wi = vectors(&wi);
+        let found = py.detach(|| measure::albedo(self, &wi, orders, samples, seed));
+        let side =
+            |side: fn(&Albedo) -> measure::Estimate| columns(py, found.iter().map(side).collect());
+        let shares: Vec<f64> = found.iter().flat_map(|a| a.orders.clone()).collect();
+        let shares = Array2::from_shape_vec((found.len(), orders), shares);
+        let mean: Array1<f64> = found.iter().map(|a| a.mean_order).collect();
+        (
+            side(|a| a.reflected),
+            side(|a| a.transmitted),
+            shares.expect("all have as many orders").into_pyarray(py),
+            mean.into_pyarray(py),
+        )
+    }
+
+    /// Walks from `wi`, binned by direction: mean weight and standard error of
+    /// each bin, (cosines × azimuths) × 3.
+    fn lobe<'py>(
+        &self,
+        py: Python<'py>,
+        wi: [f64; 3],
+        bins: [usize; 2],
+        samples: u64,
+        seed: u64,
+    ) -> Columns<'py> {
+        let wi = Vector3::new(wi[0], wi[1], wi[2]);
+        let found = py.detach(|| measure::lobe(self, wi, bins, samples, seed));
+        columns(py, found)
+    }
+}

@@ -1,0 +1,201 @@
+"""The package against closed forms and against figures measured elsewhere.
+
+Statistical checks use fixed seeds and bounds of 4.5 standard errors; with the
+some 200 comparisons below they fail by chance about once in 700 runs of fresh
+seeds, and never by chance with these.
+"""
+
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import smithwalk
+
+BOUND = 4.5
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def agree(value, stderr, expected, slack=0.0):
+    score = (np.abs(value - expected) - slack) / np.maximum(stderr, 1e-12)
+    assert (score <= BOUND).all(), score.max()
+
+
+def mirror(wi, wo):
+    """All orders of the quadratic distribution's mirror, cosine inside (Dupuy 2026)."""
+    return wo[..., 2] * (wi[..., 2] + wo[..., 2]) / (np.pi * (1.0 + (wi * wo).sum(-1)))
+
+
+def test_the_closed_form_of_the_quadratic_distribution():
+    white = smithwalk.conductor(distribution="quadratic")
+    wi = smithwalk.spherical([0.9, 0.5, 0.2], 0.3)[:, None]
+    wo = smithwalk.spherical([0.8, 0.4], [2.0, 5.0])
+    exact = mirror(wi, wo)[..., None]
+    for estimator in ("auto", "two-walk", "position-free"):
+        value, stderr = white.eval(wi, wo, estimator=estimator, samples=20_000)
+        assert value.shape == (3, 2, 3)
+        agree(value, stderr, exact)
+        assert (stderr < 0.02 * exact).all()
+    first, _ = white.eval(wi, wo, estimator="single", samples=1)
+    single = exact / (1.0 + wi[..., 2:] * wo[..., 2:])
+    np.testing.assert_allclose(first, np.broadcast_to(single, first.shape), rtol=1e-12)
+
+
+def test_the_gold_rows_of_the_albedo_page():
+    """docs/albedo.md, gold's green channel: r, cosθ and the exact albedo, by quasi-random walks in the crate."""
+    page = (ROOT / "docs/albedo.md").read_text()
+    table = page.split("Gold in the green channel")[1].split("\n\n")[1]
+    rows = [[cell.strip() for cell in line.split("|")[1:4]] for line in table.splitlines()[2:]]
+    assert len(rows) == 30
+    r, cos = (np.array([float(row[i]) for row in rows]) for i in (0, 1))
+    exact, exact_error = np.array([row[2].split(" ± ") for row in rows], float).T
+    for roughness in np.unique(r):
+        at = r == roughness
+        gold = smithwalk.conductor(alpha=roughness**2, color=(1.0, 0.71, 0.29))
+        found = gold.albedo(cos[at], samples=300_000)
+        error = np.hypot(found.reflected_stderr[:, 1], exact_error[at])
+        agree(found.reflected[:, 1], error, exact[at], slack=1e-5)  # the page's rounding
+        assert (error < 5e-4).all()
+
+
+def test_nothing_is_lost_without_absorption():
+    for material in (
+        smithwalk.conductor(alpha=(0.3, 1.2)),
+        smithwalk.dielectric(alpha=0.6, distribution="beckmann", eta=1.5),
+        smithwalk.diffuse(alpha=1.0),
+    ):
+        found = material.albedo([0.95, 0.5, 0.05], phi=1.0, samples=20_000)
+        np.testing.assert_allclose(found.reflected + found.transmitted, 1.0, atol=1e-9)
+        np.testing.assert_allclose(found.orders.sum(-1), 1.0, atol=1e-9)
+        assert (found.mean_order >= 1.0).all()
+
+
+def test_values_integrate_to_albedos():
+    gold = smithwalk.conductor(alpha=0.7, color=(1.0, 0.71, 0.29))
+    n = 64
+    cos, phi = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n * 2 * np.pi, indexing="ij")
+    value, stderr = gold.eval(smithwalk.spherical(0.6), smithwalk.spherical(cos, phi), samples=256)
+    area = 2 * np.pi / n**2
+    total, error = value.sum((0, 1)) * area, np.sqrt((stderr**2).sum((0, 1))) * area
+    found = gold.albedo(0.6, samples=200_000)
+    agree(total, np.hypot(error, found.reflected_stderr), found.reflected, slack=5e-4)
+
+
+def test_orders_add_up_and_lobes_are_the_values():
+    glass = smithwalk.dielectric(alpha=0.4, eta=1.5)
+    wi, wo = smithwalk.spherical(0.7), smithwalk.spherical([0.5, -0.8], 3.0)
+    whole, error = glass.eval(wi, wo, samples=60_000, seed=1)
+    orders, errors = glass.eval_orders(wi, wo, orders=3, samples=60_000, seed=2)
+    assert orders.shape == (2, 3, 3) and (orders > 0.0).all()
+    agree(orders.sum(1), np.hypot(error, np.sqrt((errors**2).sum(1))), whole)
+
+    lobe = glass.lobe(wi, (16, 16), samples=400_000)
+    solid_angle = 4 * np.pi / 256
+    np.testing.assert_allclose(lobe.value.sum((0, 1)) * solid_angle, 1.0, atol=1e-9)
+    cos, phi = (lobe.cos[:-1] + lobe.cos[1:]) / 2, (lobe.phi[:-1] + lobe.phi[1:]) / 2
+    # A bin's mean by 4 x 4 points in it.
+    inside = (np.arange(4) + 0.5) / 4 - 0.5
+    row, column = 3, 8
+    c, p = np.meshgrid(cos[row] + inside * 2 / 16, phi[column] + inside * 2 * np.pi / 16)
+    value, stderr = glass.eval(wi, smithwalk.spherical(c, p), samples=4096)
+    agree(
+        value.mean((0, 1)),
+        np.hypot(np.sqrt((stderr**2).sum((0, 1))) / 16, lobe.stderr[row, column]),
+        lobe.value[row, column],
+        slack=0.01 * lobe.value[row, column].max(),
+    )
+
+
+def test_reciprocity_through_glass_from_both_sides():
+    """f(wi, wo) n_i² = f(wo, wi) n_o², for the values with their cosines taken out."""
+    eta = 1.5
+    glass = smithwalk.dielectric(alpha=0.5, eta=eta, color=(1.0, 0.8, 0.5))
+    above, below = smithwalk.spherical(0.6, 0.2), smithwalk.spherical(-0.7, 2.9)
+    down, down_error = glass.eval(above, below, samples=100_000)
+    up, up_error = glass.eval(below, above, samples=100_000, seed=7)
+    agree(down / 0.7, np.hypot(down_error / 0.7, up_error * eta**2 / 0.6), up / 0.6 * eta**2)
+
+
+def test_samples_follow_the_values():
+    """Mean of weight · g over walks = ∫ value · g, for a smooth g."""
+    matte = smithwalk.diffuse(alpha=0.8, color=0.8)
+    wi = smithwalk.spherical(0.4)
+    wo, weight, order = matte.sample(np.broadcast_to(wi, (200_000, 3)), seed=3)
+    assert wo.shape == (200_000, 3) and order.dtype == np.uint32
+    left = order > 0
+    np.testing.assert_allclose(np.linalg.norm(wo[left], axis=-1), 1.0, atol=1e-12)
+    g = weight * wo[:, :1] ** 2
+    n = 48
+    cos, phi = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n * 2 * np.pi, indexing="ij")
+    directions = smithwalk.spherical(cos, phi)
+    value, stderr = matte.eval(wi, directions, samples=256)
+    factor = directions[..., :1] ** 2 * (2 * np.pi / n**2)
+    agree(
+        g.mean(0),
+        np.hypot(g.std(0) / np.sqrt(len(g)), np.sqrt(((stderr * factor) ** 2).sum((0, 1)))),
+        (value * factor).sum((0, 1)),
+        slack=2e-4,
+    )
+    density = matte.pdf(wi, directions)
+    assert density.shape == (n, n) and (density > 0.0).all()
+    np.testing.assert_allclose(density.sum() * 2 * np.pi / n**2, 1.0, atol=2e-3)
+
+
+def test_opaque_surfaces_are_black_from_below():
+    gold = smithwalk.conductor(alpha=0.5)
+    below = smithwalk.spherical(-0.5)
+    assert (gold.eval(below, smithwalk.spherical(0.5))[0] == 0.0).all()
+    assert gold.sample(below)[2] == 0
+
+
+def test_the_same_for_any_number_of_threads():
+    code = (
+        "import numpy as np, smithwalk; m = smithwalk.dielectric(alpha=.5);"
+        "v, e = m.eval(smithwalk.spherical([.3, .8]), smithwalk.spherical(.5, 2.), samples=20000, seed=5);"
+        "print(v.tobytes().hex(), e.tobytes().hex(), m.albedo(.5, samples=20000).reflected.tobytes().hex())"
+    )
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "RAYON_NUM_THREADS": threads},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for threads in ("1", "2", "5")
+    }
+    assert len(outputs) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda m: m.eval([0, 0, 2.0], [0, 0, 1.0]), "wi: expected unit vectors"),
+        (lambda m: m.eval([0, 0, 1.0], [[0, 0, 1.0], [0, np.nan, 1.0]]), r"wo\[1\]"),
+        (lambda m: m.eval([0, 1.0], [0, 0, 1.0]), "wi: expected directions"),
+        (lambda m: m.eval(np.ones((2, 3)) / 3**0.5, np.ones((5, 3)) / 3**0.5), "does not broadcast"),
+        (lambda m: m.eval([0, 0, 1.0], [0, 0, 1.0], samples=0), "samples: expected"),
+        (lambda m: m.eval([0, 0, 1.0], [0, 0, 1.0], estimator="fast"), "estimator: expected"),
+        (lambda m: m.eval_orders([0, 0, 1.0], [0, 0, 1.0], estimator="single"), "estimator:"),
+        (lambda m: m.albedo(1.5), "cos: expected"),
+        (lambda m: m.lobe([[0, 0, 1.0]]), "wi: expected one direction"),
+        (lambda m: smithwalk.conductor(), "alpha: expected"),
+        (lambda m: smithwalk.conductor(alpha=-1), "alpha: expected"),
+        (lambda m: smithwalk.conductor(alpha=0.5, color=2), "color: expected"),
+        (lambda m: smithwalk.conductor(alpha=0.5, eta=0.2), "k: eta and k"),
+        (lambda m: smithwalk.conductor(alpha=0.5, distribution="phong"), "distribution: expected"),
+        (lambda m: smithwalk.conductor(alpha=0.5, distribution="quadratic"), "alpha: the quadratic"),
+        (lambda m: smithwalk.dielectric(alpha=0.5, eta=0), "eta: expected"),
+    ],
+)
+def test_errors_name_the_argument(call, words):
+    with pytest.raises(ValueError, match=words):
+        call(smithwalk.conductor(alpha=0.5))
+
+
+def test_counts_are_whole_numbers():
+    with pytest.raises(TypeError, match="samples: expected a whole number"):
+        smithwalk.diffuse(alpha=0.5).albedo(0.5, samples=1e5)
