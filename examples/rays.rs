@@ -12,16 +12,14 @@
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, ensure};
 use cpu_time::ThreadTime;
 use smithwalk::description::Description;
 use smithwalk::embree::{Accelerator, Query, Ray, recorded};
-use smithwalk::film::{AovSet, Film, PixelFilter};
-use smithwalk::image::Window;
-use smithwalk::integrator::{Limits, RenderReport, RenderRequest, render};
-use smithwalk::scene::{Scene, resolve};
+use smithwalk::film::{AovSet, PixelFilter};
+use smithwalk::integrator::{Control, RenderReport, render};
+use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene, resolve};
 
 /// Samples per pixel: some of those that split as planned after the pilots, ten to thirty
 /// million rays for the scenes of the repository.
@@ -45,9 +43,16 @@ fn main() -> Result<()> {
 /// Measures one scene and prints its row.
 fn row(path: &Path) -> Result<()> {
     let description = Description::load(path, &[])?;
-    let scene = resolve(&description)?.scene;
-    let resolution = [description.film.width, description.film.height];
-    let render = || rendered(&scene, resolution, description.sampling.seed);
+    let Resolved {
+        scene, settings, ..
+    } = resolve(&description)?;
+    let settings = RenderSettings {
+        filter: PixelFilter::box_filter(),
+        aovs: AovSet::NONE,
+        limits: Limits::samples(SPP),
+        ..settings
+    };
+    let render = || rendered(&scene, &settings);
 
     let mut report = None;
     let queries = recorded(|| report = Some(render()));
@@ -94,19 +99,9 @@ fn row(path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn rendered(scene: &Scene, resolution: [u32; 2], seed: u64) -> Result<RenderReport> {
-    let camera = scene.camera.as_ref().context("the scene has no camera")?;
-    let mut film = Film::new(resolution, Window::full(resolution), AovSet::NONE);
-    let request = RenderRequest {
-        scene,
-        camera,
-        filter: &PixelFilter::box_filter(),
-        seed,
-        limits: Limits::samples(SPP),
-        all_in: false,
-        interrupt: &AtomicBool::new(false),
-    };
-    Ok(render(&request, &mut film, |_| ()))
+fn rendered(scene: &Scene, settings: &RenderSettings) -> Result<RenderReport> {
+    let mut film = settings.film();
+    Ok(render(scene, settings, &mut film, Control::default())?)
 }
 
 /// The rays that look for the nearest hit, and those that look for any.

@@ -6,27 +6,20 @@ use std::process::Command;
 
 use serde_json::Value;
 use smithwalk::description::Description;
-use smithwalk::film::PixelFilter;
 use smithwalk::report::converge::{Plan, Reference, View, measure};
-use smithwalk::scene::{Scene, resolve};
+use smithwalk::scene::{Resolved, resolve};
 
 const SCENE: &str = "scenes/gold_sphere/scene.yaml";
 
 /// The gold sphere at 32 × 32 pixels.
-fn small_scene() -> Scene {
+fn small_scene() -> Resolved {
     let overrides = ["film.width", "film.height"].map(|path| (path.to_owned(), "32".to_owned()));
     let description = Description::load(Path::new(SCENE), &overrides).unwrap();
-    resolve(&description).unwrap().scene
+    resolve(&description).unwrap()
 }
 
-fn view(scene: &Scene) -> View<'_> {
-    const BOX: &PixelFilter = &PixelFilter::box_filter();
-    View {
-        scene,
-        camera: scene.camera.as_ref().unwrap(),
-        filter: BOX,
-        resolution: [32, 32],
-    }
+fn view(small: &Resolved) -> View<'_> {
+    View::new(&small.scene, &small.settings).unwrap()
 }
 
 /// A folder of its own, removed at the end.

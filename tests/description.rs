@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 use smithwalk::description::{
-    Aov, Aperture, AreaShape, Assignment, Axis, Channel, Color, Description, Estimator, Film,
-    Filter, LightKind, LightUnits, Material, MaterialRef, Opening, Projection, Reflectance,
-    Roughness, Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
+    Aperture, AreaShape, Assignment, Axis, Channel, Color, Description, Estimator, Film, Filter,
+    LightKind, LightUnits, Material, MaterialRef, Opening, Projection, Reflectance, Roughness,
+    Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
 };
+use smithwalk::film::Aov;
 use smithwalk::texture::{ColorSpace, Interpolation};
 
 fn read(text: &str) -> Description {

@@ -25,8 +25,7 @@ fn scenes() -> Vec<std::path::PathBuf> {
 }
 
 /// A few pixels in the middle, so that every scene takes part in little time.
-fn middle(description: &smithwalk::description::Description) -> Window {
-    let (width, height) = (description.film.width, description.film.height);
+fn middle([width, height]: [u32; 2]) -> Window {
     let size = 48.min(width).min(height);
     Window {
         x: (width - size) / 2,
@@ -105,16 +104,15 @@ fn leaving_features_out_changes_no_bit() {
     let scenes = scenes().into_iter().map(|path| (path, &[][..]));
     let mut kernels = BTreeSet::new();
     for (path, changes) in scenes.chain(plainer) {
-        let (description, scene) = load(&path, changes);
-        kernels.insert(kernel_for(scene.features));
+        let loaded = load(&path, changes);
+        kernels.insert(kernel_for(loaded.scene.features));
         let settings = Settings {
-            window: Some(middle(&description)),
+            window: Some(middle(loaded.settings.resolution)),
             ..Settings::spp(4)
         };
-        let lean = film(&description, &scene, settings, &[]);
+        let lean = film(&loaded, settings, &[]);
         let full = film(
-            &description,
-            &scene,
+            &loaded,
             Settings {
                 all_in: true,
                 ..settings

@@ -7,14 +7,13 @@ use std::process::ExitCode;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde_json::json;
-use smithwalk::film::PixelFilter;
 use smithwalk::image::read_exr;
 use smithwalk::report::converge::{
     Abscissa, Curve, Fit, Plan, Reach, Reference, Run, View, chart, measure, read_peers,
 };
-use smithwalk::scene::Scene;
+use smithwalk::scene::{RenderSettings, Scene};
 
-use super::render::{EstimatorName, pixel_filter, positive};
+use super::render::{EstimatorName, positive};
 use super::scene::SceneArgs;
 
 /// Samples of the reference for each of the longest measured render.
@@ -109,34 +108,22 @@ struct Measured {
 /// A scene with one estimator.
 struct Prepared {
     scene: Scene,
-    filter: PixelFilter,
-    resolution: [u32; 2],
+    settings: RenderSettings,
 }
 
 impl Prepared {
     fn new(args: &Args, estimator: EstimatorName, log: &mut dyn Write) -> anyhow::Result<Self> {
         let mut description = args.scene.describe()?;
         description.sampling.estimator = estimator.into();
-        let scene = args.scene.resolve(&description, log)?;
-        ensure!(
-            scene.camera.is_some(),
-            "{}: there is no `camera`, so there is nothing to see",
-            args.scene.scene.display()
-        );
-        Ok(Self {
-            scene,
-            filter: pixel_filter(description.film.filter),
-            resolution: [description.film.width, description.film.height],
-        })
+        let (scene, settings) = args.scene.resolve(&description, log)?;
+        let prepared = Self { scene, settings };
+        View::new(&prepared.scene, &prepared.settings)
+            .with_context(|| args.scene.scene.display().to_string())?;
+        Ok(prepared)
     }
 
     fn view(&self) -> View<'_> {
-        View {
-            scene: &self.scene,
-            camera: self.scene.camera.as_ref().expect("checked above"),
-            filter: &self.filter,
-            resolution: self.resolution,
-        }
+        View::new(&self.scene, &self.settings).expect("checked above")
     }
 }
 
@@ -149,7 +136,7 @@ fn measure_all(args: &Args, log: &mut dyn Write) -> anyhow::Result<Measured> {
         .reference_spp
         .unwrap_or_else(|| args.spp.saturating_mul(REFERENCE_FACTOR).max(2));
     let model = Prepared::new(args, EstimatorName::Auto, log)?;
-    let resolution = model.resolution;
+    let resolution = model.settings.resolution;
     let truth = match &args.reference {
         Some(path) => {
             let image = read_exr(path)?;

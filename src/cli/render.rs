@@ -7,14 +7,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use smithwalk::description::{Aov as AovName, Description, Estimator, Filter};
+use smithwalk::description::{Description, Estimator};
 use smithwalk::features::Features;
-use smithwalk::film::{Aov, AovSet, Film, PixelFilter, sidecar_path};
+use smithwalk::film::{Film, sidecar_path};
 use smithwalk::image::{OutputPath, Window};
-use smithwalk::integrator::{Limits, Progress, RenderReport, RenderRequest, Stop, begun, render};
-use smithwalk::scene::Scene;
+use smithwalk::integrator::{Control, Progress, RenderReport, Stop, begun, render};
+use smithwalk::scene::{Limits, RenderSettings, Scene};
 
 use super::scene::SceneArgs;
 
@@ -114,7 +114,6 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let mut description = args.scene.describe()?;
     apply(args, &mut description);
     let outputs = outputs(args)?;
-    let window = window(args, &description)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
@@ -122,19 +121,14 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
             .context("can't start the threads")?;
     }
 
-    let scene = args.scene.resolve(&description, log)?;
-    let Some(camera) = &scene.camera else {
-        bail!(
-            "{}: there is no `camera`, so there is nothing to see",
-            args.scene.scene.display()
-        );
-    };
-    let mut film = Film::new(resolution(&description), window, aovs(&description));
+    let (scene, settings) = args.scene.resolve(&description, log)?;
+    let settings = override_settings(args, settings)?;
+    let mut film = settings.film();
     let fingerprint = fingerprint(&description);
     let sidecar = sidecar_path(outputs[0].path());
     if args.resume && sidecar.exists() {
         film.resume(&sidecar, fingerprint)?;
-        match begun(&scene, &film) {
+        match begun(&settings, &film) {
             0 => writeln!(log, "too few samples to go on from: starting afresh")?,
             samples => writeln!(log, "resuming at {samples} samples per pixel")?,
         }
@@ -145,21 +139,15 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     // A second render in one process would find the handler set; there is none.
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
         .context("can't listen for Ctrl-C")?;
-    let limits = limits(args, &description);
-    let bar = progress_bar(&limits);
-    let request = RenderRequest {
-        scene: &scene,
-        camera,
-        filter: &pixel_filter(description.film.filter),
-        seed: description.sampling.seed,
-        limits,
-        all_in: args.all_in,
-        interrupt: &interrupt,
+    let bar = progress_bar(&settings.limits);
+    let mut progress = |progress| show(&bar, &settings.limits, progress);
+    let control = Control {
+        interrupt: Some(&interrupt),
+        progress: Some(&mut progress),
     };
     let cpu_before = cpu_seconds();
-    let report = render(&request, &mut film, |progress| {
-        show(&bar, &limits, progress)
-    });
+    let report = render(&scene, &settings, &mut film, control)
+        .with_context(|| args.scene.scene.display().to_string())?;
     bar.finish_and_clear();
     let cpu = cpu_before
         .zip(cpu_seconds())
@@ -170,7 +158,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let mut failed = None;
     for output in &outputs {
         // One that fails must not keep the others from being written.
-        match output.write(&image, description.film.exposure) {
+        match output.write(&image, settings.exposure) {
             Ok(()) => writeln!(out, "{}", output.path().display())?,
             Err(error) => failed = Some(error),
         }
@@ -195,18 +183,24 @@ fn apply(args: &Args, description: &mut Description) {
     }
 }
 
-fn limits(args: &Args, description: &Description) -> Limits {
+/// What the command line says beside the description.
+fn override_settings(args: &Args, settings: RenderSettings) -> anyhow::Result<RenderSettings> {
     let open_ended = args.time.is_some() || args.noise.is_some();
     let default = if open_ended {
         MOST_SPP
     } else {
-        description.sampling.spp
+        settings.limits.spp
     };
-    Limits {
-        spp: args.spp.unwrap_or(default),
-        time: args.time.map(Duration::from_secs_f64),
-        noise: args.noise,
-    }
+    Ok(RenderSettings {
+        window: window(args, settings.resolution)?,
+        limits: Limits {
+            spp: args.spp.unwrap_or(default),
+            time: args.time.map(Duration::from_secs_f64),
+            noise: args.noise,
+        },
+        all_in: args.all_in,
+        ..settings
+    })
 }
 
 /// The files to write, each checked now so that no finished render is lost.
@@ -230,12 +224,7 @@ fn outputs(args: &Args) -> anyhow::Result<Vec<OutputPath>> {
     Ok(outputs)
 }
 
-fn resolution(description: &Description) -> [u32; 2] {
-    [description.film.width, description.film.height]
-}
-
-fn window(args: &Args, description: &Description) -> anyhow::Result<Window> {
-    let [width, height] = resolution(description);
+fn window(args: &Args, [width, height]: [u32; 2]) -> anyhow::Result<Window> {
     let Some([x0, y0, x1, y1]) = args.crop else {
         return Ok(Window::full([width, height]));
     };
@@ -249,25 +238,6 @@ fn window(args: &Args, description: &Description) -> anyhow::Result<Window> {
         width: x1 - x0,
         height: y1 - y0,
     })
-}
-
-fn aovs(description: &Description) -> AovSet {
-    let aov = |name: &AovName| match name {
-        AovName::Albedo => Aov::Albedo,
-        AovName::Normal => Aov::Normal,
-        AovName::Depth => Aov::Depth,
-        AovName::Variance => Aov::Variance,
-        AovName::Single => Aov::Single,
-        AovName::Multiple => Aov::Multiple,
-    };
-    description.film.aovs.iter().map(aov).collect()
-}
-
-pub fn pixel_filter(filter: Filter) -> PixelFilter {
-    match filter {
-        Filter::Box {} => PixelFilter::box_filter(),
-        Filter::BlackmanHarris { width } => PixelFilter::blackman_harris(width),
-    }
 }
 
 /// Tells renders of other scenes apart, so that their samples are not mixed.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use smithwalk::description::Description;
-use smithwalk::scene::{Resolved, Scene, resolve};
+use smithwalk::scene::{RenderSettings, Resolved, Scene, resolve};
 
 /// A scene file and changes to it.
 #[derive(clap::Args)]
@@ -31,12 +31,20 @@ impl SceneArgs {
     }
 
     /// Builds the scene and tells of repairs.
-    pub fn resolve(&self, description: &Description, log: &mut dyn Write) -> anyhow::Result<Scene> {
-        let Resolved { scene, repairs } = resolve(description)
+    pub fn resolve(
+        &self,
+        description: &Description,
+        log: &mut dyn Write,
+    ) -> anyhow::Result<(Scene, RenderSettings)> {
+        let Resolved {
+            scene,
+            settings,
+            repairs,
+        } = resolve(description)
             .with_context(|| format!("{} can't be rendered", self.scene.display()))?;
         for repair in repairs {
             writeln!(log, "warning: {repair}")?;
         }
-        Ok(scene)
+        Ok((scene, settings))
     }
 }

@@ -25,7 +25,7 @@ pub use material::{
     Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Tangent, Transparent,
 };
 pub use problem::{Problem, Problems};
-pub use settings::{Aov, Estimator, Film, Filter, LightUnits, Sampling, World};
+pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
 pub use value::{Channel, Color, Scalar};
 

@@ -1,6 +1,7 @@
 //! The image, the sampling and the surroundings.
 
 use super::value;
+use crate::film::Aov;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -61,24 +62,6 @@ pub enum Filter {
 
 fn blackman_harris_width() -> f32 {
     1.5
-}
-
-/// An image beside the beauty pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Aov {
-    /// The reflectance of the first hit.
-    Albedo,
-    /// The shading normal of the first hit, in world space.
-    Normal,
-    /// The distance along the view axis, in metres.
-    Depth,
-    /// The variance of the pixel's mean.
-    Variance,
-    /// Light scattered once by every rough surface it met.
-    Single,
-    /// Light scattered more than once by some rough surface.
-    Multiple,
 }
 
 /// How many paths, how long, and by which estimator.

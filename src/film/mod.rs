@@ -9,12 +9,14 @@
 //!
 //! [`Film::develop`] turns sums into an [`Image`].
 
+mod aov;
 mod filter;
 mod noise;
 mod plan;
 mod resume;
 mod tile;
 
+pub use aov::{Aov, AovSet};
 pub use filter::PixelFilter;
 pub use plan::{Draws, Spread};
 pub use resume::{ResumeError, sidecar_path};
@@ -25,87 +27,6 @@ use crate::image::{Image, Layer, Window};
 /// Side of a tile in pixels: small enough to share out evenly among threads,
 /// large enough that neighbours in memory are worked on by one thread.
 const TILE_SIZE: u32 = 16;
-
-/// An arbitrary output variable: a layer of the image beside its colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Aov {
-    /// Directional albedo of the first surface, in [0, 1]; 0 where there is none.
-    Albedo,
-    /// Shading normal of the first surface in world space, averaged over the
-    /// samples and hence shorter than 1 at edges; 0 where there is none.
-    Normal,
-    /// Distance to the first surface along the view axis in metres, averaged over the
-    /// samples that have one; 1e10, as in Blender, where none has.
-    Depth,
-    /// Variance of the pixel's mean colour, see [`FilmTile::variance`].
-    Variance,
-    /// The part of the colour that met no microsurface more than once per
-    /// surface interaction.
-    Single,
-    /// The rest: what multiple scattering within microsurfaces adds.
-    Multiple,
-}
-
-impl Aov {
-    /// All of them, in the order of their layers.
-    pub const ALL: [Self; 6] = [
-        Self::Albedo,
-        Self::Normal,
-        Self::Depth,
-        Self::Variance,
-        Self::Single,
-        Self::Multiple,
-    ];
-
-    /// The name in scene files and of the layer in EXR files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Albedo => "albedo",
-            Self::Normal => "normal",
-            Self::Depth => "depth",
-            Self::Variance => "variance",
-            Self::Single => "single",
-            Self::Multiple => "multiple",
-        }
-    }
-
-    /// Names of its channels in EXR files.
-    const fn channels(self) -> &'static [&'static str] {
-        match self {
-            Self::Normal => &["X", "Y", "Z"],
-            Self::Depth => &["Z"],
-            Self::Albedo | Self::Variance | Self::Single | Self::Multiple => &["R", "G", "B"],
-        }
-    }
-}
-
-/// The AOVs that were asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AovSet(u8);
-
-impl AovSet {
-    /// No AOVs: the colour alone.
-    pub const NONE: Self = Self(0);
-
-    /// Whether `aov` was asked for.
-    pub const fn contains(self, aov: Aov) -> bool {
-        self.0 & (1 << aov as u8) != 0
-    }
-
-    /// Those asked for, in the order of [`Aov::ALL`].
-    pub fn iter(self) -> impl Iterator<Item = Aov> {
-        Aov::ALL.into_iter().filter(move |&aov| self.contains(aov))
-    }
-}
-
-impl FromIterator<Aov> for AovSet {
-    fn from_iter<I: IntoIterator<Item = Aov>>(aovs: I) -> Self {
-        Self(
-            aovs.into_iter()
-                .fold(0, |bits, aov| bits | (1 << aov as u8)),
-        )
-    }
-}
 
 /// The accumulators of an image.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,4 +7,4 @@ mod sum;
 
 pub use kernel::{KERNELS, kernel_for};
 pub use path::{FirstHit, PathResult, PathTracer, Split};
-pub use render::{Limits, Progress, RenderReport, RenderRequest, Stop, begun, render};
+pub use render::{Control, Progress, RenderError, RenderReport, Stop, begun, render};

@@ -10,10 +10,10 @@ use crate::bsdf::{Bsdf, ByOrder, InLanes, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
-use crate::film::{Sample, Spread};
+use crate::film::{Aov, Sample, Spread};
 use crate::light::{EmitterId, LightSample};
 use crate::sampler::{Dimension, Purpose, Sampler};
-use crate::scene::{Scene, Surface, View};
+use crate::scene::{RenderSettings, Scene, Surface, View};
 use smithwalk_model::LANES;
 
 use super::sum::{Sum, mean};
@@ -170,6 +170,7 @@ struct Vertex {
 /// Traces paths through `scene`, with code for the features `F` alone.
 pub struct PathTracer<'a, const F: u32> {
     scene: &'a Scene,
+    settings: &'a RenderSettings,
     /// Whether the first hit's AOVs are wanted.
     describe_first: bool,
     /// Whether it is to be told how the draws at the first surface differ.
@@ -182,14 +183,15 @@ impl<'a, const F: u32> PathTracer<'a, F> {
     /// # Panics
     /// When they are not.
     #[must_use]
-    pub fn new(scene: &'a Scene, describe_first: bool, pilot: bool) -> Self {
+    pub fn new(scene: &'a Scene, settings: &'a RenderSettings, pilot: bool) -> Self {
         assert!(
             Features::from_bits(F).contains(scene.features),
             "the kernel lacks a feature"
         );
         Self {
             scene,
-            describe_first,
+            settings,
+            describe_first: settings.aovs.iter().any(Aov::is_of_first_hit),
             pilot,
         }
     }
@@ -288,7 +290,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                     distance: path.last.travelled + hit.t,
                 });
             }
-            if path.bounce <= self.scene.max_bounces {
+            if path.bounce <= self.settings.max_bounces {
                 path.travelling = hit.t;
                 return Some(surface);
             }
@@ -422,7 +424,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         };
         path.bounce += 1;
 
-        if path.bounce >= self.scene.roulette_start {
+        if path.bounce >= self.settings.roulette_start {
             let survival = path.throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
             if sampler.get_1d(Dimension::roulette(path.vertex)) >= survival {
                 return false;

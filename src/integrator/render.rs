@@ -10,32 +10,9 @@ use super::kernel::pass_for;
 use super::path::{PathTracer, Split};
 use crate::camera::Camera;
 use crate::features::{Features, has};
-use crate::film::{Aov, Draws, Film, FilmTile, PixelFilter, Spread};
+use crate::film::{Draws, Film, FilmTile, Spread};
 use crate::sampler::{Dimension, Sampler};
-use crate::scene::Scene;
-
-/// When to stop. Whatever is reached first counts.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Samples per pixel, those of a resumed film included.
-    pub spp: u32,
-    /// Wall-clock time.
-    pub time: Option<Duration>,
-    /// Estimated relative error of the image; see [`Film::relative_error`].
-    pub noise: Option<f64>,
-}
-
-impl Limits {
-    /// So many samples per pixel, however long they take.
-    #[must_use]
-    pub fn samples(spp: u32) -> Self {
-        Self {
-            spp,
-            time: None,
-            noise: None,
-        }
-    }
-}
+use crate::scene::{RenderSettings, Scene};
 
 /// Why rendering ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,20 +72,21 @@ const TIME_SLICE: f64 = 0.05;
 
 /// One pass over the film.
 pub(super) struct Job<'a> {
-    request: &'a RenderRequest<'a>,
+    scene: &'a Scene,
+    settings: &'a RenderSettings,
+    camera: &'a Camera,
     /// Samples `first .. first + count` of every pixel.
     first: u32,
     count: u32,
     /// Whether the film takes note of how samples differ within themselves.
     pilot: bool,
-    describe_first: bool,
 }
 
 impl Job<'_> {
     /// How camera path number `index` of a pixel splits, given what was planned for it.
     /// The draws of a pixel are numbered on through its paths.
     fn split(&self, planned: Draws, index: u32) -> Split {
-        let pilot = if splits(self.request.scene) {
+        let pilot = if splits(self.settings) {
             Draws::PILOT
         } else {
             Draws::ONE
@@ -133,16 +111,16 @@ impl Job<'_> {
 }
 
 /// Whether paths split at all; plain ones need neither pilots nor a plan.
-fn splits(scene: &Scene) -> bool {
-    scene.branches != Some(1)
+fn splits(settings: &RenderSettings) -> bool {
+    settings.branches != Some(1)
 }
 
 /// How many of a film's samples per pixel [`render`] goes on from: all, or none when
 /// they are too few to know how paths are to split. What those tell about the others is
 /// not kept with them.
-pub fn begun(scene: &Scene, film: &Film) -> u32 {
+pub fn begun(settings: &RenderSettings, film: &Film) -> u32 {
     match film.samples_per_pixel() {
-        ..OUTLINE_SAMPLES if splits(scene) => 0,
+        ..OUTLINE_SAMPLES if splits(settings) => 0,
         samples => samples,
     }
 }
@@ -155,46 +133,58 @@ fn exceeds_pilot(planned: Draws) -> bool {
         || planned.branches > Draws::PILOT.branches
 }
 
-/// What to render, and how far.
-#[derive(Clone, Copy, Debug)]
-pub struct RenderRequest<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// From where.
-    pub camera: &'a Camera,
-    /// How samples spread within a pixel.
-    pub filter: &'a PixelFilter,
-    /// Another seed gives another, independent image.
-    pub seed: u64,
-    /// When to stop.
-    pub limits: Limits,
-    /// Use the kernel with every feature instead of the leanest that serves.
-    pub all_in: bool,
-    /// Becomes true when somebody wants it to end.
-    pub interrupt: &'a AtomicBool,
+/// Why nothing can be rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RenderError {
+    /// The scene has no camera.
+    #[error("there is no `camera`, so there is nothing to see")]
+    NoCamera,
+}
+
+/// How a render is watched and ended; none of it changes the image. Threads are those
+/// of the rayon pool that it is called in.
+#[derive(Default)]
+pub struct Control<'a> {
+    /// Becomes true when somebody wants the render to end.
+    pub interrupt: Option<&'a AtomicBool>,
+    /// Is called before each pass and at the end.
+    pub progress: Option<&'a mut dyn FnMut(Progress)>,
 }
 
 /// Renders into `film`, which may have samples already: they are counted and
 /// continued, see [`begun`]. The image depends on scene, seed and number of samples alone,
-/// not on threads or passes. When `interrupt` becomes true the current pass is
+/// not on threads or passes. When somebody interrupts the render, the current pass is
 /// finished first, so that all pixels have equally many samples.
+///
+/// # Errors
+/// When the scene has no camera.
+///
+/// # Panics
+/// When the film is of another layout than [`RenderSettings::film`].
 pub fn render(
-    request: &RenderRequest<'_>,
+    scene: &Scene,
+    settings: &RenderSettings,
     film: &mut Film,
-    mut progress: impl FnMut(Progress),
-) -> RenderReport {
+    mut control: Control<'_>,
+) -> Result<RenderReport, RenderError> {
     let start = Instant::now();
-    let limits = request.limits;
-    let (kernel, pass) = pass_for(request.scene, request.all_in);
-    let aovs = film.aovs();
-    let describe_first = [Aov::Albedo, Aov::Normal, Aov::Depth]
-        .into_iter()
-        .any(|aov| aovs.contains(aov));
-    let splits = splits(request.scene);
-    let begun = begun(request.scene, film);
+    assert!(
+        film.window() == settings.window && film.aovs() == settings.aovs,
+        "the film is of another layout"
+    );
+    let camera = scene.camera.as_ref().ok_or(RenderError::NoCamera)?;
+    let limits = settings.limits;
+    let (kernel, pass) = pass_for(scene, settings.all_in);
+    let splits = splits(settings);
+    let begun = begun(settings, film);
     if begun < film.samples_per_pixel() {
-        *film = Film::new(film.resolution(), film.window(), aovs);
+        *film = settings.film();
     }
+    let mut progress = |progress| {
+        if let Some(watch) = &mut control.progress {
+            watch(progress);
+        }
+    };
     let mut spp = begun;
     let mut rays = 0;
     let mut noise = None;
@@ -208,7 +198,10 @@ pub fn render(
             target: limits.spp,
             elapsed,
         });
-        if request.interrupt.load(Ordering::Relaxed) {
+        if control
+            .interrupt
+            .is_some_and(|flag| flag.load(Ordering::Relaxed))
+        {
             stop = Stop::Interrupted;
             break;
         }
@@ -230,18 +223,19 @@ pub fn render(
             count = count.min(planned - spp);
         }
         let job = Job {
-            request,
+            scene,
+            settings,
+            camera,
             pilot,
             first: spp,
             count,
-            describe_first,
         };
         let pass_start = Instant::now();
         rays += pass(&job, film.tiles_mut());
         spp += count;
         slowest_sample = slowest_sample.max(pass_start.elapsed() / count);
         if pilot && spp == PILOT_SAMPLES {
-            scale = film.plan(request.scene.branches);
+            scale = film.plan(settings.branches);
         }
         if pilot && spp == OUTLINE_SAMPLES {
             film.plan_camera_rays(scale);
@@ -259,7 +253,7 @@ pub fn render(
         target: limits.spp,
         elapsed: start.elapsed(),
     });
-    RenderReport {
+    Ok(RenderReport {
         spp,
         added: spp - begun,
         wall: start.elapsed(),
@@ -267,7 +261,7 @@ pub fn render(
         stop,
         noise: noise.or_else(|| film.relative_error()),
         kernel,
-    }
+    })
 }
 
 /// Samples per pixel of the next pass: doubling from one, so that early
@@ -285,7 +279,7 @@ fn pass_length(done: u32, left: u32, time: Option<Duration>, sample: Duration) -
 
 /// Adds the job's samples to every tile; returns the rays traced.
 pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -> u64 {
-    let tracer = PathTracer::<F>::new(job.request.scene, job.describe_first, job.pilot);
+    let tracer = PathTracer::<F>::new(job.scene, job.settings, job.pilot);
     tiles
         .par_iter_mut()
         // A few tiles can cost most of a pass: none waits behind another.
@@ -317,12 +311,7 @@ fn render_sample<const F: u32>(
     index: u32,
     tile: &mut FilmTile,
 ) -> u32 {
-    let RenderRequest {
-        camera,
-        filter,
-        seed,
-        ..
-    } = *job.request;
+    let RenderSettings { filter, seed, .. } = job.settings;
     let planned = tile.draws(pixel);
     // One before anything is planned.
     let camera_rays = planned.camera_rays.max(1);
@@ -330,7 +319,7 @@ fn render_sample<const F: u32>(
     let mut spreads = [Spread::default(); 2];
     let mut rays = 0;
     for path in index * camera_rays..(index + 1) * camera_rays {
-        let mut sampler = Sampler::new(seed, pixel, path);
+        let mut sampler = Sampler::new(*seed, pixel, path);
         let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
         let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
         let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
@@ -338,9 +327,9 @@ fn render_sample<const F: u32>(
         } else {
             [0.5; 2]
         };
-        let ray = camera.ray(raster, lens);
+        let ray = job.camera.ray(raster, lens);
         // Depth counts along the view axis, not along the ray.
-        let depth_scale = ray.direction.dot(camera.forward());
+        let depth_scale = ray.direction.dot(job.camera.forward());
         let result = tracer.trace(ray, &mut sampler, job.split(planned, path));
         rays += result.rays;
         paths.push(result.to_sample(depth_scale));

@@ -5,6 +5,7 @@ mod load;
 mod material;
 mod materials;
 mod resolve;
+mod settings;
 mod surface;
 mod transform;
 
@@ -15,6 +16,7 @@ pub use material::{
 };
 pub use materials::{MaterialError, Names, compile_material};
 pub use resolve::{ResolveError, Resolved, assemble, resolve};
+pub use settings::{Limits, RenderSettings};
 pub use surface::{Surface, View};
 pub use transform::{euler, to_affine};
 
@@ -91,13 +93,6 @@ pub struct Scene {
     pub camera: Option<Camera>,
     /// What the scene uses.
     pub features: Features,
-    /// Surface interactions after the first.
-    pub max_bounces: u32,
-    /// Russian roulette starts at this bounce.
-    pub roulette_start: u32,
-    /// Into how many branches a path splits at its first surface, on average; see
-    /// [`crate::film::Film::plan`].
-    pub branches: Option<u32>,
 }
 
 impl Scene {

@@ -8,7 +8,7 @@ use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 use super::load::Assets;
 use super::materials::{Names, compile_material};
 use super::transform::to_affine;
-use super::{Leaf, Material, Number, Object, Roughness, Scene, SceneMesh, Tangent};
+use super::{Leaf, Material, Number, Object, RenderSettings, Roughness, Scene, SceneMesh, Tangent};
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::description::{Assignment, Description, Transform};
@@ -39,6 +39,8 @@ impl std::error::Error for ResolveError {}
 pub struct Resolved {
     /// Ready to render.
     pub scene: Scene,
+    /// As the description has them.
+    pub settings: RenderSettings,
     /// Repairs of input files and things that were left out, for people.
     pub repairs: Vec<String>,
 }
@@ -156,12 +158,13 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
         lights,
         camera,
         features: Features::NONE,
-        max_bounces: description.sampling.max_bounces,
-        roulette_start: description.sampling.roulette_start,
-        branches: description.sampling.branches,
     };
     scene.features = features(&scene);
-    Ok(Resolved { scene, repairs })
+    Ok(Resolved {
+        scene,
+        settings: RenderSettings::new(description),
+        repairs,
+    })
 }
 
 /// Compiles materials when an object first uses them.

@@ -1,25 +1,21 @@
 //! What several test files share: rendering scene files without the command.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
-use smithwalk::description::{Description, Filter};
-use smithwalk::film::{Aov, Film, PixelFilter};
+use smithwalk::description::Description;
+use smithwalk::film::{Aov, Film};
 use smithwalk::image::{Image, Window};
-use smithwalk::integrator::{Limits, RenderRequest, render};
-use smithwalk::scene::{Scene, resolve};
+use smithwalk::integrator::{Control, render};
+use smithwalk::scene::{Limits, RenderSettings, Resolved, resolve};
 
 /// A scene file with changes, read and built.
-pub fn load(path: &Path, overrides: &[(&str, &str)]) -> (Description, Scene) {
+pub fn load(path: &Path, overrides: &[(&str, &str)]) -> Resolved {
     let overrides: Vec<(String, String)> = overrides
         .iter()
         .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
         .collect();
     let description = Description::load(path, &overrides).unwrap_or_else(|e| panic!("{e}"));
-    let scene = resolve(&description)
-        .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-        .scene;
-    (description, scene)
+    resolve(&description).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 /// What a render of a test is like.
@@ -45,30 +41,22 @@ impl Settings {
 }
 
 /// The film after a render, with the AOVs asked for.
-pub fn film(description: &Description, scene: &Scene, settings: Settings, aovs: &[Aov]) -> Film {
-    let resolution = [description.film.width, description.film.height];
-    let window = settings.window.unwrap_or(Window::full(resolution));
-    let mut film = Film::new(resolution, window, aovs.iter().copied().collect());
-    let filter = match description.film.filter {
-        Filter::Box {} => PixelFilter::box_filter(),
-        Filter::BlackmanHarris { width } => PixelFilter::blackman_harris(width),
-    };
-    let request = RenderRequest {
-        scene,
-        camera: scene.camera.as_ref().expect("the scene has a camera"),
-        filter: &filter,
+pub fn film(loaded: &Resolved, settings: Settings, aovs: &[Aov]) -> Film {
+    let settings = RenderSettings {
+        window: settings.window.unwrap_or(loaded.settings.window),
+        aovs: aovs.iter().copied().collect(),
         seed: settings.seed,
         limits: Limits::samples(settings.spp),
         all_in: settings.all_in,
-        interrupt: &AtomicBool::new(false),
+        ..loaded.settings.clone()
     };
-    render(&request, &mut film, |_| ());
+    let mut film = settings.film();
+    render(&loaded.scene, &settings, &mut film, Control::default()).expect("there is a camera");
     assert!(film.faults().is_empty(), "{:?}", film.faults());
     film
 }
 
 /// The image of a scene file.
 pub fn image(path: &Path, overrides: &[(&str, &str)], settings: Settings, aovs: &[Aov]) -> Image {
-    let (description, scene) = load(path, overrides);
-    film(&description, &scene, settings, aovs).develop()
+    film(&load(path, overrides), settings, aovs).develop()
 }

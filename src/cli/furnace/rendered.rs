@@ -3,16 +3,14 @@
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 use std::io::Write;
-use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
 use serde_json::{Value, json};
 use smithwalk::description::Description;
-use smithwalk::film::{Aov, Film, PixelFilter};
-use smithwalk::image::Window;
-use smithwalk::integrator::{Limits, RenderRequest, render};
+use smithwalk::film::{Aov, PixelFilter};
+use smithwalk::integrator::{Control, render};
 use smithwalk::mesh::Mesh;
-use smithwalk::scene::{Assets, Scene, assemble};
+use smithwalk::scene::{Assets, Limits, RenderSettings, Resolved, Scene, assemble};
 use smithwalk::texture::EnvironmentImage;
 
 use super::table::{ALPHAS, DISTRIBUTIONS, KINDS, white};
@@ -59,24 +57,19 @@ impl Row {
 /// Renders `scene` and averages the pixels that see a surface.
 pub fn render_furnace(
     scene: &Scene,
-    description: &Description,
+    settings: RenderSettings,
     spp: u32,
     seed: u64,
 ) -> anyhow::Result<Furnace> {
-    let camera = scene.camera.as_ref().context("there is no `camera`")?;
-    let resolution = [description.film.width, description.film.height];
-    let aovs = [Aov::Depth, Aov::Variance].into_iter().collect();
-    let mut film = Film::new(resolution, Window::full(resolution), aovs);
-    let request = RenderRequest {
-        scene,
-        camera,
-        filter: &PixelFilter::box_filter(),
+    let settings = RenderSettings {
+        filter: PixelFilter::box_filter(),
+        aovs: [Aov::Depth, Aov::Variance].into_iter().collect(),
         seed,
         limits: Limits::samples(spp),
-        all_in: false,
-        interrupt: &AtomicBool::new(false),
+        ..settings
     };
-    render(&request, &mut film, |_| ());
+    let mut film = settings.film();
+    render(scene, &settings, &mut film, Control::default())?;
     let image = film.develop();
     let depth = image
         .layer(Aov::Depth.name())
@@ -132,8 +125,10 @@ pub fn measure(spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
                         }),
                         ..Assets::default()
                     };
-                    let scene = assemble(&description, assets)?.scene;
-                    let furnace = render_furnace(&scene, &description, spp, seed)?;
+                    let Resolved {
+                        scene, settings, ..
+                    } = assemble(&description, assets)?;
+                    let furnace = render_furnace(&scene, settings, spp, seed)?;
                     let Furnace { mean, se, .. } = furnace;
                     rows.push(Row {
                         kind,

@@ -1,55 +1,65 @@
 //! Renders, and the error after each doubling of samples.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use cpu_time::ProcessTime;
 use serde::Serialize;
 
 use super::Run;
-use crate::camera::Camera;
-use crate::film::{AovSet, Film, PixelFilter};
+use crate::film::{AovSet, Film};
 use crate::image::{Image, Window};
-use crate::integrator::{Limits, RenderRequest, render};
+use crate::integrator::{Control, RenderError, render};
 use crate::metrics::{REL_EPSILON, noise_floor, rel_mse_trimmed};
-use crate::scene::Scene;
+use crate::scene::{Limits, RenderSettings, Scene};
 
-/// What is rendered.
-#[derive(Clone, Copy, Debug)]
+/// What is rendered: all of a scene's image, its colour alone.
+#[derive(Clone, Debug)]
 pub struct View<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// From where.
-    pub camera: &'a Camera,
-    /// How samples spread within a pixel.
-    pub filter: &'a PixelFilter,
-    /// Width and height in pixels.
-    pub resolution: [u32; 2],
+    scene: &'a Scene,
+    settings: RenderSettings,
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
+    /// Of a scene with these settings.
+    ///
+    /// # Errors
+    /// When the scene has no camera.
+    pub fn new(scene: &'a Scene, settings: &RenderSettings) -> Result<Self, RenderError> {
+        if scene.camera.is_none() {
+            return Err(RenderError::NoCamera);
+        }
+        let settings = RenderSettings {
+            window: Window::full(settings.resolution),
+            aovs: AovSet::NONE,
+            ..settings.clone()
+        };
+        Ok(Self { scene, settings })
+    }
+
+    /// Width and height in pixels.
+    #[must_use]
+    pub fn resolution(&self) -> [u32; 2] {
+        self.settings.resolution
+    }
+
     /// An empty film for it.
     #[must_use]
     pub fn film(&self) -> Film {
-        let window = Window::full(self.resolution);
-        Film::new(self.resolution, window, AovSet::NONE)
+        self.settings.film()
     }
 
     /// Renders on until `film` has `spp` samples per pixel; returns wall-clock
     /// and CPU time.
     pub fn render(&self, film: &mut Film, seed: u64, spp: u32) -> (Duration, Duration) {
-        let request = RenderRequest {
-            scene: self.scene,
-            camera: self.camera,
-            filter: self.filter,
+        let settings = RenderSettings {
             seed,
             limits: Limits::samples(spp),
-            all_in: false,
-            interrupt: &AtomicBool::new(false),
+            ..self.settings.clone()
         };
         let cpu = ProcessTime::now();
-        let report = render(&request, film, |_| ());
-        (report.wall, cpu.elapsed())
+        let report = render(self.scene, &settings, film, Control::default());
+        let wall = report.expect("the scene has a camera").wall;
+        (wall, cpu.elapsed())
     }
 }
 

@@ -1,0 +1,91 @@
+//! What is rendered of a scene, how far, and how: all that decides about an image
+//! beside the scene itself.
+
+use std::time::Duration;
+
+use crate::description::{Description, Filter};
+use crate::film::{AovSet, Film, PixelFilter};
+use crate::image::Window;
+
+/// When to stop. Whatever is reached first counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Samples per pixel, those of a resumed film included.
+    pub spp: u32,
+    /// Wall-clock time.
+    pub time: Option<Duration>,
+    /// Estimated relative error of the image; see [`Film::relative_error`].
+    pub noise: Option<f64>,
+}
+
+impl Limits {
+    /// So many samples per pixel, however long they take.
+    #[must_use]
+    pub fn samples(spp: u32) -> Self {
+        Self {
+            spp,
+            time: None,
+            noise: None,
+        }
+    }
+}
+
+/// How a scene is rendered.
+#[derive(Clone, Debug)]
+pub struct RenderSettings {
+    /// Width and height of the full image in pixels.
+    pub resolution: [u32; 2],
+    /// The part of it that is rendered.
+    pub window: Window,
+    /// How samples spread within a pixel.
+    pub filter: PixelFilter,
+    /// What is kept beside the colour.
+    pub aovs: AovSet,
+    /// Another seed gives another, independent image.
+    pub seed: u64,
+    /// When to stop.
+    pub limits: Limits,
+    /// In stops; for PNG alone.
+    pub exposure: f32,
+    /// Surface interactions after the first.
+    pub max_bounces: u32,
+    /// Russian roulette starts at this bounce.
+    pub roulette_start: u32,
+    /// Into how many branches a path splits at its first surface, on average over the
+    /// pixels where they differ; 1 is plain path tracing, and `None` leaves it to what
+    /// a branch costs.
+    pub branches: Option<u32>,
+    /// Use the kernel with every feature instead of the leanest that serves.
+    pub all_in: bool,
+}
+
+impl RenderSettings {
+    /// As the scene file says: the full image.
+    #[must_use]
+    pub fn new(description: &Description) -> Self {
+        let (film, sampling) = (&description.film, &description.sampling);
+        let resolution = [film.width, film.height];
+        Self {
+            resolution,
+            window: Window::full(resolution),
+            filter: match film.filter {
+                Filter::Box {} => PixelFilter::box_filter(),
+                Filter::BlackmanHarris { width } => PixelFilter::blackman_harris(width),
+            },
+            aovs: film.aovs.iter().copied().collect(),
+            seed: sampling.seed,
+            limits: Limits::samples(sampling.spp),
+            exposure: film.exposure,
+            max_bounces: sampling.max_bounces,
+            roulette_start: sampling.roulette_start,
+            branches: sampling.branches,
+            all_in: false,
+        }
+    }
+
+    /// An empty film for the window, which must lie within the image.
+    #[must_use]
+    pub fn film(&self) -> Film {
+        Film::new(self.resolution, self.window, self.aovs)
+    }
+}
