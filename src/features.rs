@@ -25,7 +25,7 @@ features! {
     /// Anything that light samples can connect to.
     LIGHT_SAMPLING = 2, "light sampling", "a shadow ray, a BSDF value and a proxy density per hit";
     /// Light shapes that rays can meet: areas, spheres, suns with a disk.
-    AREA_LIGHTS = 3, "area lights", "an intersection per light and ray";
+    AREA_LIGHTS = 3, "area lights", "a search along each ray";
     /// Meshes with emission.
     EMISSIVE_MESHES = 4, "emissive meshes", "a table of their triangles";
     /// Dielectric closures.

@@ -11,7 +11,7 @@ use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
 use crate::film::{Aov, Sample, Spread};
-use crate::light::{EmitterId, LightSample};
+use crate::light::{EmitterId, LightSample, Receiver};
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{RenderSettings, Scene, Surface, View};
 use smithwalk_model::LANES;
@@ -120,7 +120,7 @@ impl Path {
             throughput: Rgb::ONE,
             multiple: false,
             last: Vertex {
-                position: ray.origin,
+                receiver: ray.origin.into(),
                 pdf: None,
                 travelled: 0.0,
             },
@@ -158,11 +158,12 @@ impl Path {
 /// The last vertex that light samples could have continued from.
 #[derive(Clone)]
 struct Vertex {
-    position: Vec3,
+    /// Where it is, as light samples there had it.
+    receiver: Receiver,
     /// Density of the direction taken, sr⁻¹; `None` where no light sample
     /// competes: at the camera and after single directions.
     pdf: Option<f32>,
-    /// Distance from `position` to where the current ray starts: more than
+    /// Distance from there to where the current ray starts: more than
     /// zero after passing straight through surfaces.
     travelled: f32,
 }
@@ -418,7 +419,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         path.ray = surface.spawn(sample.wi);
         path.multiple |= sample.order > 1;
         path.last = Vertex {
-            position: surface.position,
+            receiver: self.scene.receiver(surface),
             pdf,
             travelled: 0.0,
         };
@@ -441,22 +442,25 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
         let mut sum = Rgb::ZERO;
         let segment = Ray {
-            origin: last.position,
+            origin: last.receiver.position,
             t_near: last.travelled,
             t_far: t_far.map_or(f32::INFINITY, |t| last.travelled + t),
             ..*ray
         };
-        self.scene
-            .lights
-            .crossed(&segment, camera, |radiance, light_pdf| {
+        self.scene.lights.crossed(
+            &segment,
+            last.receiver.normal,
+            camera,
+            |radiance, light_pdf| {
                 sum += radiance * last.weight(light_pdf);
-            });
+            },
+        );
         sum
     }
 
     /// What a ray that leaves the scene brings.
     fn world(&self, last: &Vertex, direction: Vec3) -> Rgb {
-        let (radiance, light_pdf) = self.scene.lights.world(last.position, direction);
+        let (radiance, light_pdf) = self.scene.lights.world(last.receiver, direction);
         if has::<F>(Features::LIGHT_SAMPLING) {
             radiance * last.weight(light_pdf)
         } else {
@@ -474,7 +478,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
         let light_pdf = match last.pdf {
             Some(_) => self.scene.lights.triangle_pdf(
-                last.position,
+                last.receiver,
                 EmitterId(first + surface.triangle),
                 surface.position,
                 surface.geometric_normal,
@@ -517,7 +521,7 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         let light = self
             .scene
             .lights
-            .sample(surface.position, choice, position)?;
+            .sample(self.scene.receiver(surface), choice, position)?;
         let pdf = bsdf.pdf(wo, light.direction);
         if pdf <= 0.0 {
             return None;

@@ -1,5 +1,6 @@
 //! Flat lights: rectangles and ellipses.
 
+use super::tree::{Cone, Extent};
 use super::warp::unit_disk;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
@@ -147,13 +148,19 @@ impl AreaLight {
         self.radiance
     }
 
-    pub(super) fn bounds(&self) -> (Vec3, f32) {
-        (self.center, self.half[0].hypot(self.half[1]))
-    }
-
-    /// The luminance of its power, W.
-    pub(super) fn power(&self) -> f32 {
-        luminance(self.radiance) * PI * self.area
+    /// What a tree of lights knows of it.
+    pub(super) fn extent(&self) -> Extent {
+        let (reach, peak) = match &self.spread {
+            Some(spread) => (spread.tan_limit.atan(), spread.normalization),
+            None => (PI / 2.0, 1.0),
+        };
+        Extent {
+            center: self.center,
+            radius: self.half[0].hypot(self.half[1]),
+            intensity: luminance(self.radiance) * peak * self.area,
+            softening: self.area / PI,
+            cone: Cone::around(self.normal, reach),
+        }
     }
 
     /// The luminance of about the irradiance at `p`, W·m⁻²; 0 only where the

@@ -13,6 +13,7 @@ mod point;
 mod resolve;
 mod select;
 mod sun;
+mod tree;
 mod triangles;
 pub(crate) mod warp;
 
@@ -26,9 +27,29 @@ pub use triangles::{EmissiveTriangle, EmitterId};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use glam::Vec3;
-use select::Chooser;
-use std::f32::consts::PI;
+use select::{Chooser, FEW, Far, Many, Reach};
+use tree::{Extent, Tree};
 use triangles::Triangles;
+
+/// What light arrives at.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Metres.
+    pub position: Vec3,
+    /// A unit normal, by whose side light counts; `None` where light from all
+    /// around counts alike.
+    pub normal: Option<Vec3>,
+}
+
+impl From<Vec3> for Receiver {
+    /// A point that takes light from all around.
+    fn from(position: Vec3) -> Self {
+        Self {
+            position,
+            normal: None,
+        }
+    }
+}
 
 /// A point of a light, seen from the shading point.
 #[derive(Clone, Copy, Debug)]
@@ -73,21 +94,28 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The luminance of its power, W; that of a sun on a disk of `radius` metres.
-    fn power(&self, radius: f32) -> f32 {
-        match self {
-            Self::Point(light) => light.power(),
-            Self::Sun(light) => light.irradiance() * PI * radius * radius,
-            Self::Area(light) => light.power(),
+    /// Whether it shines at all.
+    fn shines(&self) -> bool {
+        match self.reach() {
+            Reach::Near(extent) => extent.intensity > 0.0,
+            Reach::Far(light) => light.irradiance > 0.0,
         }
     }
 
-    /// A ball that holds it; `None` for what is infinitely far.
-    fn bounds(&self) -> Option<(Vec3, f32)> {
+    /// How it counts among many.
+    fn reach(&self) -> Reach {
         match self {
-            Self::Point(light) => Some(light.bounds()),
-            Self::Sun(_) => None,
-            Self::Area(light) => Some(light.bounds()),
+            Self::Point(light) => Reach::Near(light.extent()),
+            Self::Sun(light) => Reach::Far(light.far()),
+            Self::Area(light) => Reach::Near(light.extent()),
+        }
+    }
+
+    /// Its ball, if rays can meet it somewhere.
+    fn ball(&self) -> Option<Extent> {
+        match self.reach() {
+            Reach::Near(extent) if extent.radius > 0.0 => Some(extent),
+            _ => None,
         }
     }
 
@@ -135,6 +163,12 @@ pub struct Lights {
     world: World,
     triangles: Option<Triangles>,
     chooser: Option<Chooser>,
+    /// The lamps with size that are not infinitely far, for rays to meet.
+    sized: Vec<u32>,
+    /// The same as a tree, when they are several.
+    sized_tree: Option<Tree>,
+    /// The suns that are disks.
+    suns: Vec<u32>,
 }
 
 /// What there is to choose from, in the order of the chooser's indices.
@@ -142,7 +176,10 @@ pub struct Lights {
 enum Candidate<'a> {
     Lamp(&'a Light),
     Environment(&'a Environment),
-    Triangles(&'a Triangles),
+    /// All triangles, as one light among few.
+    Together(&'a Triangles),
+    /// One of them, among many.
+    Triangle(&'a Triangles, usize),
 }
 
 impl Lights {
@@ -151,23 +188,48 @@ impl Lights {
     /// ([`EmitterId`]).
     #[must_use]
     pub fn new(mut lamps: Vec<Light>, world: World, triangles: Vec<EmissiveTriangle>) -> Self {
-        lamps.retain(|light| light.shape.power(1.0) > 0.0);
+        lamps.retain(|light| light.shape.shines());
+        let has_environment = matches!(world, World::Environment(_));
+        let many = lamps.len() + usize::from(has_environment) + triangles.len() > FEW;
+        let which = |wanted: fn(&Shape) -> bool| {
+            let numbered = (0..).zip(&lamps);
+            let wanted = numbered.filter(|(_, light)| wanted(&light.shape));
+            wanted.map(|(index, _)| index).collect::<Vec<u32>>()
+        };
+        let sized = which(|shape| shape.ball().is_some());
+        let suns = which(|shape| matches!(shape, Shape::Sun(sun) if sun.is_disk()));
+        let balls: Vec<Extent> = sized
+            .iter()
+            .filter_map(|&index| lamps[index as usize].shape.ball())
+            .collect();
         let mut lights = Self {
             lamps,
             world,
-            triangles: Triangles::new(triangles),
+            triangles: Triangles::new(triangles, !many),
             chooser: None,
+            sized_tree: (balls.len() > 1).then(|| Tree::new(&balls)).flatten(),
+            sized,
+            suns,
         };
-        let radius = lights.radius();
-        let powers: Vec<f32> = (0..)
-            .map_while(|index| lights.candidate(index))
-            .map(|candidate| match candidate {
-                Candidate::Lamp(light) => light.shape.power(radius),
-                Candidate::Environment(image) => image.irradiance() * PI * radius * radius,
-                Candidate::Triangles(triangles) => triangles.power(),
-            })
-            .collect();
-        lights.chooser = Chooser::new(&powers);
+        let candidates = || (0..).map_while(|index| lights.candidate(index));
+        lights.chooser = if many {
+            let reaches = candidates().map(|candidate| match candidate {
+                Candidate::Lamp(light) => light.shape.reach(),
+                Candidate::Environment(image) => Reach::Far(Far {
+                    irradiance: image.irradiance(),
+                    towards: None,
+                }),
+                Candidate::Together(triangles) => Reach::Near(triangles.extent(0)),
+                Candidate::Triangle(triangles, index) => Reach::Near(triangles.extent(index)),
+            });
+            Many::new(reaches).map(|many| Chooser::ByTree(Box::new(many)))
+        } else {
+            match candidates().count() {
+                0 => None,
+                1 => Some(Chooser::Only),
+                n => Some(Chooser::ByContribution(n)),
+            }
+        };
         lights
     }
 
@@ -182,6 +244,19 @@ impl Lights {
     #[must_use]
     pub fn lamps(&self) -> &[Light] {
         &self.lamps
+    }
+
+    /// Whether they are so many that bounds are weighed, with the receiver's
+    /// normal.
+    #[must_use]
+    pub fn are_many(&self) -> bool {
+        matches!(self.chooser, Some(Chooser::ByTree(_)))
+    }
+
+    /// Whether rays can meet any of them: lamps with size, suns with a disk.
+    #[must_use]
+    pub fn can_be_crossed(&self) -> bool {
+        !(self.sized.is_empty() && self.suns.is_empty())
     }
 
     /// The surroundings.
@@ -208,22 +283,36 @@ impl Lights {
             + world
             + self.triangles.as_ref().map_or(0, Triangles::bytes)
             + self.chooser.as_ref().map_or(0, Chooser::bytes)
+            + size_of_val(self.sized.as_slice())
+            + self.sized_tree.as_ref().map_or(0, Tree::bytes)
+            + size_of_val(self.suns.as_slice())
     }
 
     /// Chooses a light by `u_select` and a point on it by `u`, all in [0, 1),
-    /// as seen from `p` (metres). A few lights are chosen by what they are
-    /// about to contribute at `p`, many by power. `None` when the chosen one
-    /// does not reach `p`; the sample then counts as zero.
+    /// as seen from the receiver. A few lights are chosen by what they are
+    /// about to contribute there, many by bounds of that. `None` when the chosen one
+    /// does not reach it; the sample then counts as zero.
     #[must_use]
-    pub fn sample(&self, p: Vec3, u_select: f32, u: [f32; 2]) -> Option<LightSample> {
-        let (index, selection, rest) = self
-            .chooser
-            .as_ref()?
-            .choose(u_select, |index| self.contribution(index, p))?;
+    pub fn sample(
+        &self,
+        receiver: impl Into<Receiver>,
+        u_select: f32,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        let receiver = receiver.into();
+        let p = receiver.position;
+        let (index, selection, rest) =
+            self.chooser
+                .as_ref()?
+                .choose(&receiver, u_select, u, |index| self.contribution(index, p))?;
         let sample = match self.candidate(index)? {
             Candidate::Lamp(light) => light.shape.sample(p, selection, u),
             Candidate::Environment(image) => Some(image.sample(selection, u)),
-            Candidate::Triangles(triangles) => triangles.sample(p, selection, rest, u),
+            Candidate::Together(triangles) => {
+                let (triangle, probability) = triangles.choose(rest)?;
+                triangles.sample(p, triangle, selection * probability, u)
+            }
+            Candidate::Triangle(triangles, triangle) => triangles.sample(p, triangle, selection, u),
         }?;
         // From a light itself, from its plane, or beyond the range of f32.
         let usable = sample.pdf > 0.0
@@ -236,43 +325,63 @@ impl Lights {
     }
 
     /// Calls `visit` with the radiance (W·m⁻²·sr⁻¹) and the density (sr⁻¹, as
-    /// [`Lights::sample`] from the ray's origin has it) of every lamp that the
+    /// [`Lights::sample`] from the ray's origin has it for that normal) of every lamp that the
     /// ray meets before its end, and of every sun when the end is infinite.
     /// `camera` says that it is a camera ray, which does not see all lights.
     /// The ray's direction must be a unit vector.
     #[inline]
-    pub fn crossed(&self, ray: &Ray, camera: bool, mut visit: impl FnMut(Rgb, f32)) {
-        for (index, light) in self.lamps.iter().enumerate() {
+    pub fn crossed(
+        &self,
+        ray: &Ray,
+        normal: Option<Vec3>,
+        camera: bool,
+        mut visit: impl FnMut(Rgb, f32),
+    ) {
+        let receiver = Receiver {
+            position: ray.origin,
+            normal,
+        };
+        let mut test = |index: u32| {
+            let light = &self.lamps[index as usize];
             if camera && !light.visible_to_camera {
-                continue;
+                return;
             }
             if let Some((radiance, pdf)) = light.shape.crossed(ray) {
-                visit(radiance, pdf * self.selection(index, ray.origin));
+                visit(radiance, pdf * self.selection(index as usize, &receiver));
             }
+        };
+        match &self.sized_tree {
+            Some(tree) => tree.along(ray, |number| test(self.sized[number as usize])),
+            None => self.sized.iter().copied().for_each(&mut test),
+        }
+        if ray.t_far == f32::INFINITY {
+            self.suns.iter().copied().for_each(&mut test);
         }
     }
 
     /// The radiance (W·m⁻²·sr⁻¹) of the surroundings in a unit direction and
-    /// the density (sr⁻¹) with which [`Lights::sample`] from `p` would have
-    /// chosen it: 0 for constant surroundings. Suns are not part of it.
+    /// the density (sr⁻¹) with which [`Lights::sample`] would have chosen it: 0 for constant surroundings. Suns are not part of it.
     #[must_use]
-    pub fn world(&self, p: Vec3, direction: Vec3) -> (Rgb, f32) {
+    pub fn world(&self, receiver: impl Into<Receiver>, direction: Vec3) -> (Rgb, f32) {
         match &self.world {
             World::Constant(radiance) => (*radiance, 0.0),
             World::Environment(image) => {
                 let (radiance, pdf) = image.seen(direction);
-                (radiance, pdf * self.selection(self.lamps.len(), p))
+                (
+                    radiance,
+                    pdf * self.selection(self.lamps.len(), &receiver.into()),
+                )
             }
         }
     }
 
-    /// The density (sr⁻¹) with which [`Lights::sample`] from `p` would have
-    /// chosen `hit_point` on an emissive triangle of this unit
+    /// The density (sr⁻¹) with which [`Lights::sample`] would have chosen
+    /// `hit_point` on an emissive triangle of this unit
     /// `geometric_normal` (of either sign).
     #[must_use]
     pub fn triangle_pdf(
         &self,
-        p: Vec3,
+        receiver: impl Into<Receiver>,
         emitter: EmitterId,
         hit_point: Vec3,
         geometric_normal: Vec3,
@@ -280,8 +389,21 @@ impl Lights {
         let Some(triangles) = &self.triangles else {
             return 0.0;
         };
-        let index = self.lamps.len() + usize::from(self.has_environment());
-        triangles.pdf(p, emitter, hit_point, geometric_normal) * self.selection(index, p)
+        let receiver = receiver.into();
+        let base = self.lamps.len() + usize::from(self.has_environment());
+        let triangle = emitter.0 as usize;
+        let selection = if triangles.are_together() {
+            self.selection(base, &receiver) * triangles.probability(triangle)
+        } else {
+            self.selection(base + triangle, &receiver)
+        };
+        triangles.pdf(
+            receiver.position,
+            triangle,
+            selection,
+            hit_point,
+            geometric_normal,
+        )
     }
 
     fn has_environment(&self) -> bool {
@@ -292,12 +414,18 @@ impl Lights {
         if let Some(light) = self.lamps.get(index) {
             return Some(Candidate::Lamp(light));
         }
-        match (index - self.lamps.len(), &self.world) {
-            (0, World::Environment(image)) => Some(Candidate::Environment(image)),
-            (0, World::Constant(_)) | (1, World::Environment(_)) => {
-                self.triangles.as_ref().map(Candidate::Triangles)
+        let mut index = index - self.lamps.len();
+        if let World::Environment(image) = &self.world {
+            if index == 0 {
+                return Some(Candidate::Environment(image));
             }
-            _ => None,
+            index -= 1;
+        }
+        let triangles = self.triangles.as_ref()?;
+        if triangles.are_together() {
+            (index == 0).then_some(Candidate::Together(triangles))
+        } else {
+            (index < triangles.len()).then_some(Candidate::Triangle(triangles, index))
         }
     }
 
@@ -306,28 +434,18 @@ impl Lights {
         match self.candidate(index) {
             Some(Candidate::Lamp(light)) => light.shape.contribution(p),
             Some(Candidate::Environment(image)) => image.irradiance(),
-            Some(Candidate::Triangles(triangles)) => triangles.contribution(p),
-            None => 0.0,
+            Some(Candidate::Together(triangles)) => triangles.contribution(p),
+            // Weighed by the tree.
+            Some(Candidate::Triangle(..)) | None => 0.0,
         }
     }
 
-    /// The probability with which a candidate is chosen at `p`.
-    fn selection(&self, index: usize, p: Vec3) -> f32 {
+    /// The probability with which a candidate is chosen.
+    fn selection(&self, index: usize, receiver: &Receiver) -> f32 {
         self.chooser.as_ref().map_or(0.0, |chooser| {
-            chooser.probability(index, |index| self.contribution(index, p))
+            chooser.probability(receiver, index, |index| {
+                self.contribution(index, receiver.position)
+            })
         })
-    }
-
-    /// The radius of a ball round all that is not infinitely far, metres; 1
-    /// when there is nothing. It weighs suns against lamps when they are many.
-    fn radius(&self) -> f32 {
-        let balls = || {
-            let lamps = self.lamps.iter().filter_map(|light| light.shape.bounds());
-            lamps.chain(self.triangles.as_ref().map(Triangles::bounds))
-        };
-        let low = balls().fold(Vec3::INFINITY, |low, (c, r)| low.min(c - r));
-        let high = balls().fold(Vec3::NEG_INFINITY, |high, (c, r)| high.max(c + r));
-        let radius = (high - low).length() / 2.0;
-        if radius.is_normal() { radius } else { 1.0 }
     }
 }

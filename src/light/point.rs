@@ -1,6 +1,7 @@
 //! Points, spheres and spots.
 
-use super::warp::Cone;
+use super::tree::{Cone, Extent};
+use super::warp;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
 use crate::embree::Ray;
@@ -45,6 +46,31 @@ impl Beam {
             blend: (1.0 - cos_half) * blend.clamp(0.0, 1.0),
             cosine,
         })
+    }
+
+    /// A cone that holds all directions it shines into.
+    fn bounds(&self) -> Cone {
+        /// Beams with unequal scales are measured in as many directions.
+        const RIM: u32 = 16;
+        /// What the largest angle may exceed those by.
+        const MARGIN: f32 = 1.05;
+        let to_world = self.to_local.as_dmat3().inverse().as_mat3();
+        let Some(axis) = (-to_world.z_axis).try_normalize() else {
+            return Cone::ALL;
+        };
+        let sin_half = (1.0 - self.cos_half * self.cos_half).max(0.0).sqrt();
+        let widest = (0..RIM)
+            .map(|i| {
+                let (sin, cos) = (2.0 * PI * i as f32 / RIM as f32).sin_cos();
+                let rim = to_world * Vec3::new(sin_half * cos, sin_half * sin, -self.cos_half);
+                rim.angle_between(axis)
+            })
+            .fold(0.0, f32::max);
+        if widest.is_finite() {
+            Cone::around(axis, (widest * MARGIN).min(PI))
+        } else {
+            Cone::ALL
+        }
     }
 
     /// The factor on the intensity in a unit direction away from the light.
@@ -103,17 +129,16 @@ impl PointLight {
         self.intensity / (PI * self.radius() * self.radius())
     }
 
-    pub(super) fn bounds(&self) -> (Vec3, f32) {
-        (self.position, self.radius())
-    }
-
-    /// The luminance of its power, W.
-    pub(super) fn power(&self) -> f32 {
-        let solid_angle = match &self.beam {
-            Some(beam) => 2.0 * PI * (1.0 - beam.cos_half),
-            None => 4.0 * PI,
-        };
-        luminance(self.intensity) * solid_angle
+    /// What a tree of lights knows of it.
+    pub(super) fn extent(&self) -> Extent {
+        let radius = self.radius();
+        Extent {
+            center: self.position,
+            radius,
+            intensity: luminance(self.intensity),
+            softening: radius * radius,
+            cone: self.beam.as_ref().map_or(Cone::ALL, Beam::bounds),
+        }
     }
 
     /// The luminance of about the irradiance at `p`, W·m⁻²; 0 only where the
@@ -216,7 +241,7 @@ impl PointLight {
                 let axis = axis?;
                 Some(View {
                     axis,
-                    cone: Cone::new(axis, (r / h) * (r / (h + d))),
+                    cone: warp::Cone::new(axis, (r / h) * (r / (h + d))),
                     surface: Surface::Disk { d },
                 })
             }
@@ -230,7 +255,7 @@ impl PointLight {
                 };
                 Some(View {
                     axis,
-                    cone: Cone::new(axis, one_minus_cos),
+                    cone: warp::Cone::new(axis, one_minus_cos),
                     surface: Surface::Sphere { d, r },
                 })
             }
@@ -241,7 +266,7 @@ impl PointLight {
 /// A bulb as it is seen from somewhere.
 struct View {
     axis: Vec3,
-    cone: Cone,
+    cone: warp::Cone,
     surface: Surface,
 }
 

@@ -1,5 +1,6 @@
 //! Light from infinitely far.
 
+use super::select::Far;
 use super::warp::Cone;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
@@ -74,6 +75,11 @@ impl SunLight {
         sun
     }
 
+    /// Whether rays can meet it.
+    pub(super) fn is_disk(&self) -> bool {
+        matches!(self.face, Face::Disk { .. })
+    }
+
     /// The luminance of the irradiance of a plane that faces the sun, W·m⁻².
     pub(super) fn irradiance(&self) -> f32 {
         match self.face {
@@ -89,6 +95,18 @@ impl SunLight {
                 one_minus_cos,
                 flat: true,
             } => luminance(radiance) * 2.0 * PI * one_minus_cos / (1.0 - one_minus_cos),
+        }
+    }
+
+    /// What is known of it among many lights.
+    pub(super) fn far(&self) -> Far {
+        let radius = match self.face {
+            Face::Point(_) => 0.0,
+            Face::Disk { one_minus_cos, .. } => (one_minus_cos * (2.0 - one_minus_cos)).sqrt(),
+        };
+        Far {
+            irradiance: self.irradiance(),
+            towards: Some((self.towards, radius)),
         }
     }
 

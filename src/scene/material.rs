@@ -280,6 +280,14 @@ impl Material {
             .any(|l| matches!(l.leaf, Leaf::Emission(_, strength) if strength > 0.0))
     }
 
+    /// Whether light may reach it from behind.
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        self.leaves.iter().any(|weighted| {
+            matches!(&weighted.leaf, Leaf::Rough(rough) if matches!(rough.facet, Facet::Glass(..)))
+        })
+    }
+
     /// The colour that a noise filter or a compositor takes for the albedo.
     #[must_use]
     pub fn albedo(&self, textures: &[Texture], uv: Vec2) -> Rgb {

@@ -29,7 +29,7 @@ use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
 use crate::features::{Features, has};
-use crate::light::Lights;
+use crate::light::{Lights, Receiver};
 use crate::texture::Texture;
 
 /// A mesh and what the scene needs of it.
@@ -83,6 +83,8 @@ pub struct Scene {
     pub meshes: Vec<SceneMesh>,
     /// Objects.
     pub objects: Vec<Object>,
+    /// For each emissive triangle, the index of its object.
+    pub emitters: Vec<u32>,
     /// Materials.
     pub materials: Vec<Material>,
     /// Textures.
@@ -186,6 +188,18 @@ impl Scene {
         }
     }
 
+    /// What light arrives at on a surface: among many lights, those on the
+    /// viewer's side of an opaque one count.
+    #[must_use]
+    #[inline]
+    pub fn receiver(&self, surface: &Surface) -> Receiver {
+        let one_sided = self.lights.are_many() && !self.materials[surface.material].transmits();
+        Receiver {
+            position: surface.position,
+            normal: one_sided.then_some(surface.normal),
+        }
+    }
+
     /// How many triangles rays can meet, each instance counted.
     #[must_use]
     pub fn triangles(&self) -> usize {
@@ -207,13 +221,8 @@ impl Scene {
     /// its second and third corner.
     #[must_use]
     pub fn emission_at(&self, emitter: u32, [u, v]: [f32; 2]) -> Rgb {
-        let begins = |object: &Object| object.first_emitter.filter(|&first| first <= emitter);
-        let owner = self
-            .objects
-            .iter()
-            .filter_map(|o| Some((begins(o)?, o)))
-            .max_by_key(|p| p.0);
-        let Some((first, object)) = owner else {
+        let object = &self.objects[self.emitters[emitter as usize] as usize];
+        let Some(first) = object.first_emitter else {
             return Rgb::ZERO;
         };
         let triangle = (emitter - first) as usize;

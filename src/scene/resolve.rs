@@ -151,6 +151,7 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
     let lights = Lights::new(lamps, world, triangles);
     let mut scene = Scene {
         accelerator,
+        emitters: emitters(&objects, &scene_meshes),
         meshes: scene_meshes,
         objects,
         materials,
@@ -447,6 +448,18 @@ fn emissive_triangles(
     emissive
 }
 
+/// For each of these triangles, the index of its object.
+fn emitters(objects: &[Object], meshes: &[SceneMesh]) -> Vec<u32> {
+    (0..)
+        .zip(objects)
+        .filter(|(_, object)| object.first_emitter.is_some())
+        .flat_map(|(index, object)| {
+            let count = meshes[object.mesh].triangles.len();
+            std::iter::repeat_n(index, count)
+        })
+        .collect()
+}
+
 /// What a material shines on average, W·m⁻²·sr⁻¹: textures by their mean.
 fn mean_emission(material: &Material, textures: &[Texture]) -> Rgb {
     let mut sum = Rgb::ZERO;
@@ -468,7 +481,7 @@ fn mean_emission(material: &Material, textures: &[Texture]) -> Rgb {
 fn features(scene: &Scene) -> Features {
     let mut set = Features::NONE;
     set.add_if(Features::LIGHT_SAMPLING, !scene.lights.is_empty());
-    set.add_if(Features::AREA_LIGHTS, !scene.lights.lamps().is_empty());
+    set.add_if(Features::AREA_LIGHTS, scene.lights.can_be_crossed());
     set.add_if(
         Features::ENVIRONMENT,
         matches!(scene.lights.surroundings(), World::Environment(_)),

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use smithwalk::embree::Ray;
 use smithwalk::light::{
-    AreaLight, Bulb, EmissiveTriangle, Light, Lights, Outline, PointLight, Shape, World,
+    AreaLight, Bulb, EmissiveTriangle, Light, Lights, Outline, PointLight, Receiver, Shape, World,
 };
 use std::f32::consts::PI;
 
@@ -119,13 +119,20 @@ impl Estimate {
     }
 }
 
-/// The irradiance at `p` with `normal` by light samples, W·m⁻².
-pub fn irradiance(lights: &Lights, p: Vec3, normal: Vec3, n: usize, seed: u64) -> Estimate {
+/// The irradiance on the side of `normal` by light samples, W·m⁻².
+pub fn irradiance(
+    lights: &Lights,
+    at: impl Into<Receiver>,
+    normal: Vec3,
+    n: usize,
+    seed: u64,
+) -> Estimate {
+    let at = at.into();
     let mut rng = rng(seed);
     Estimate::of(n, || {
         let u_select = rng.random();
         let u = pair(&mut rng);
-        lights.sample(p, u_select, u).map_or(0.0, |sample| {
+        lights.sample(at, u_select, u).map_or(0.0, |sample| {
             let cos = f64::from(sample.direction.dot(normal).max(0.0));
             f64::from(sample.radiance.x) * cos / f64::from(sample.pdf)
         })
@@ -149,7 +156,7 @@ pub fn check_crossings(lights: &Lights, p: Vec3, n: usize, seed: u64, tolerance:
             ray.t_far = sample.distance * 1.01;
         }
         let mut met = false;
-        lights.crossed(&ray, false, |radiance, pdf| {
+        lights.crossed(&ray, None, false, |radiance, pdf| {
             met |= (radiance - sample.radiance).length() <= tolerance * sample.radiance.length()
                 && (pdf / sample.pdf - 1.0).abs() <= tolerance;
         });
@@ -171,7 +178,7 @@ pub fn total_density(lights: &Lights, p: Vec3, n: usize, seed: u64) -> Estimate 
     Estimate::of(n, || {
         let ray = Ray::new(p, direction(&mut rng));
         let mut sum = 0.0;
-        lights.crossed(&ray, false, |_, pdf| sum += f64::from(pdf));
+        lights.crossed(&ray, None, false, |_, pdf| sum += f64::from(pdf));
         sum * 4.0 * std::f64::consts::PI
     })
 }

@@ -5,4 +5,5 @@ mod density;
 mod environment;
 mod extremes;
 mod irradiance;
+mod many;
 mod units;
