@@ -1,6 +1,6 @@
 //! Every entry point of the model over the whole domain, one call at a time.
 
-use super::domain::{ALPHAS, COSINES, ETAS, Metered, direction, largest, metals};
+use super::domain::{ALPHAS, COSINES, ETAS, Grazing, Metered, direction, largest, metals, stream};
 use super::findings::{Findings, Kind};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -24,6 +24,9 @@ const MOST_DRAWS_SMOOTH: usize = 2 * 6 * 100;
 fn valid<F: Real>(value: Rgb<F>) -> bool {
     value.0.iter().all(|c| c.is_finite() && *c >= F::zero())
 }
+
+/// Pairs near grazing that a test asks, 660 calls each.
+const PAIRS: usize = 3000;
 
 /// What is asked of a surface.
 pub struct Question<'a, F> {
@@ -319,6 +322,50 @@ where
         .merged(quadratic)
 }
 
+/// Pairs of directions near grazing and near mirror directions.
+pub fn grazing<F: Real>(seed: u64, pairs: usize, short: bool) -> Findings
+where
+    Stream<Pcg64Mcg>: Draw<F>,
+{
+    let starts = starts::<F>();
+    let at = |pair: usize| {
+        let mut found = Findings::default();
+        let seed = (seed << 32) + pair as u64;
+        let Grazing {
+            alpha: (ax, ay),
+            ends: [wi, wo],
+        } = Grazing::new(&mut stream(seed));
+        let question = Question {
+            wi: direction(wi.0, wi.1),
+            wo: direction(wo.0, wo.1),
+            // Mostly random ones: what happens there depends on several.
+            first: &starts[(pair % 16).saturating_sub(11)],
+            seed,
+            numbers: |u| u,
+            smooth: ax <= 1.0 && ay <= 1.0,
+            short,
+        };
+        let (alpha_x, alpha_y) = (F::of(ax), F::of(ay));
+        let name = format!("GGX {ax} {ay}");
+        question.ask_all(&name, Ggx { alpha_x, alpha_y }, &mut found);
+        let name = format!("Beckmann {ax} {ay}");
+        question.ask_all(&name, Beckmann { alpha_x, alpha_y }, &mut found);
+        found
+    };
+    let all = (0..pairs).into_par_iter().map(at);
+    all.reduce(Findings::default, Findings::merged)
+}
+
+#[test]
+fn grazing_pairs_hold_in_single_precision() {
+    grazing::<f32>(0, PAIRS, true).assert_clean();
+}
+
+#[test]
+fn grazing_pairs_hold_in_double_precision() {
+    grazing::<f64>(1, PAIRS, true).assert_clean();
+}
+
 #[test]
 fn the_grid_holds_in_single_precision() {
     grid::<f32>(0, false).assert_clean();
@@ -340,7 +387,9 @@ fn the_grid_holds_for_a_hundred_million_calls() {
         let short = seed % 16 != 2;
         found = found
             .merged(grid::<f32>(seed, short))
-            .merged(grid::<f64>(seed, short));
+            .merged(grid::<f64>(seed, short))
+            .merged(grazing::<f32>(seed, PAIRS, short))
+            .merged(grazing::<f64>(seed, PAIRS, short));
         if found.calls >= 100_000_000 {
             break;
         }

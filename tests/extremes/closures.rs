@@ -1,7 +1,7 @@
 //! The same domain through the closures of the renderer: `sample`, `eval` and
 //! `pdf` in single precision, as paths call them.
 
-use super::domain::{ALPHAS, Metered, metals, stream};
+use super::domain::{ALPHAS, Grazing, Metered, metals, stream};
 use super::findings::{Findings, Kind};
 use super::means::{Mean, bound};
 use glam::Vec3;
@@ -274,6 +274,27 @@ fn closures_hold_everywhere() {
     let all = all.reduce(Findings::default, Findings::merged);
     all.assert_clean();
     assert!(all.calls > 100_000, "{all}");
+}
+
+#[test]
+fn closures_hold_for_grazing_pairs() {
+    let all = (0..3000u64).into_par_iter().map(|pair| {
+        let mut found = Findings::default();
+        let Grazing { alpha, ends } = Grazing::new(&mut stream(pair));
+        // Walks on rougher surfaces are long; the grid above has them.
+        if alpha.0.max(alpha.1) > 1.0 {
+            return found;
+        }
+        let [wo, wi] = ends.map(|(cos, phi)| unit(cos, phi));
+        for subject in rough(alpha, METHODS[3]) {
+            for wi in [wi, -wi] {
+                ask(&subject, wo, wi, &[], pair, &mut found);
+            }
+        }
+        found
+    });
+    all.reduce(Findings::default, Findings::merged)
+        .assert_clean();
 }
 
 /// Roughness at which light samples find all of what surfaces scatter. At the

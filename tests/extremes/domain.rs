@@ -39,6 +39,46 @@ pub const COSINES: [f64; 12] = [
     0.0,
 ];
 
+/// A surface and two directions near grazing.
+///
+/// Log-uniform over α 1e-8 to 1e4, cosθ 1e-12 to 1, cosθ/α 1e-3 to 1e6 as far as
+/// these meet; a surface in four is anisotropic. Three pairs in four are about the
+/// mirror direction: cosines within a factor of 3, azimuths within a few α, where
+/// the half vector of two grazing directions may be rounding alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Grazing {
+    pub alpha: (f64, f64),
+    /// Cosine and azimuth of the two directions.
+    pub ends: [(f64, f64); 2],
+}
+
+impl Grazing {
+    pub fn new(rng: &mut impl Draw<f64>) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * rng.draw();
+        let alpha = 10f64.powf(between(-8.0, 4.0));
+        let other = if between(0.0, 4.0) < 1.0 {
+            10f64.powf(between(-8.0, 4.0))
+        } else {
+            alpha
+        };
+        let (low, high) = ((1e-3 * alpha).clamp(1e-12, 1e-3), (1e6 * alpha).min(1.0));
+        let [here, there] = [0; 2].map(|_| 10f64.powf(between(low.log10(), high.log10())));
+        let phi = between(0.0, 7.0);
+        let mirrored = phi + std::f64::consts::PI;
+        let near = (here * 3f64.powf(between(-1.0, 1.0))).min(1.0);
+        let far = match between(0.0, 4.0) as u32 {
+            0 => (there, between(0.0, 7.0)),
+            1 => (here, mirrored),
+            2 => (near, mirrored + alpha * between(-3.0, 3.0)),
+            _ => (near, mirrored + here * between(-3.0, 3.0)),
+        };
+        Self {
+            alpha: (alpha, other),
+            ends: [(here, phi), far],
+        }
+    }
+}
+
 /// Relative indices of refraction.
 pub const ETAS: [f64; 10] = [
     1e-3,

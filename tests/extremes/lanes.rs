@@ -2,7 +2,7 @@
 //! have, and the first order and the density are those of one.
 
 use super::calls::starts;
-use super::domain::{ALPHAS, COSINES, Metered, direction, metals};
+use super::domain::{ALPHAS, COSINES, Grazing, Metered, direction, metals, stream};
 use super::findings::{Findings, Kind};
 use rayon::prelude::*;
 use smithwalk_model::*;
@@ -134,4 +134,36 @@ fn hold_everywhere<N: NdfInLanes + Debug>(new: impl Fn((f32, f32)) -> N + Sync) 
     let all = all.reduce(Findings::default, Findings::merged);
     all.assert_clean();
     assert!(all.calls > 2_000_000, "{all}");
+}
+
+#[test]
+fn lanes_hold_for_grazing_pairs_on_ggx() {
+    hold_for_grazing_pairs(|(alpha_x, alpha_y)| Ggx { alpha_x, alpha_y });
+}
+
+#[test]
+fn lanes_hold_for_grazing_pairs_on_beckmann() {
+    hold_for_grazing_pairs(|(alpha_x, alpha_y)| Beckmann { alpha_x, alpha_y });
+}
+
+fn hold_for_grazing_pairs<N: NdfInLanes + Debug>(new: impl Fn((f32, f32)) -> N + Sync) {
+    let starts: &'static [Vec<f32>; 5] = Box::leak(Box::new(Default::default()));
+    let all = (0..100_000u64).into_par_iter().map(|pair| {
+        let mut found = Findings::default();
+        let Grazing { alpha, ends } = Grazing::new(&mut stream(pair));
+        let [wi, wo] = ends.map(|(cos, phi)| direction(cos, phi));
+        let surface = Microsurface {
+            ndf: new((alpha.0 as f32, alpha.1 as f32)),
+            facets: Conductor {
+                fresnel: metals()[pair as usize % 7],
+            },
+        };
+        if surface.suits_position_free() {
+            let rng = Eight::new(starts, pair);
+            ask(&surface, wi, &[wo; LANES], rng, &mut found);
+        }
+        found
+    });
+    all.reduce(Findings::default, Findings::merged)
+        .assert_clean();
 }

@@ -199,9 +199,11 @@ where
                 }
             }
             order += 1;
-            // Connect to the far end.
+            // Connect to the far end. Seen by a ray that goes up steeply are only steep
+            // facets, and D/σ is finite for these. An overflow comes from the half vector
+            // of two directions that differ by rounding alone, which is no facet's normal.
             let phase = self.facets.phase(ndf, at, to.w, false, m);
-            if phase.density > F::zero() {
+            if phase.density > F::zero() && phase.density.is_finite() {
                 // σ(w) p is D(h)/4 without Fresnel.
                 let other = ratio * (F::of(4.0) * at.sigma * phase.density / to.sigma);
                 let value = phase.density * depth.escape(lambda) / (F::one() + other);

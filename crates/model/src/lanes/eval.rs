@@ -250,8 +250,10 @@ impl<N: NdfLanes, T: FnMut(u32, [f32x8; 3])> Walks<'_, N, T> {
                 }
             }
             order += 1;
-            // Connect to the far end.
+            // Connect to the far end, but, as the scalar estimator, not by half vectors
+            // that are rounding alone.
             let (density, length) = phase(&self.ndf, w, sigma, to.w);
+            let density = density.is_finite().blend(density, zero);
             let tint = reflectance(self.fresnel, f32x8::HALF * length);
             let other = ratio * (f32x8::from(4.0) * sigma * density / to.sigma);
             let value = density * self.depth.escape(lambda) / (one + other);
