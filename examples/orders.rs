@@ -5,12 +5,12 @@
 //! cargo run --example orders
 //! ```
 
-use smithwalk::report::validate::{Effort, Smithwalk, order_table};
+use smithwalk_validation::{Effort, Smithwalk, orders};
 
 fn main() {
     println!("| facets | α | cosθ | 1 | 2 | 3 | 4 | ≥ 5 | > 10 | mean order | cap |");
     println!("|{}", "---|".repeat(11));
-    for row in order_table(Smithwalk, Effort::Full) {
+    for row in orders::table(Smithwalk, Effort::Full) {
         let shares = row.shares.into_iter().chain([row.tail, row.beyond_ten]);
         let cells: String = shares
             .map(|share| format!(" {:.2} |", 100.0 * share))

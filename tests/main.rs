@@ -19,4 +19,3 @@ mod light;
 mod parity;
 mod render;
 mod validate;
-mod validate_faults;

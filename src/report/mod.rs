@@ -2,5 +2,6 @@
 
 pub mod converge;
 pub mod heightfield;
-pub mod plot;
 pub mod validate;
+
+pub use smithwalk_validation::plot;

@@ -2,13 +2,12 @@
 //! where correlation matters; they must not depart more than is known.
 
 use super::ValidateError;
-use super::check::{Case, Check, Statement};
-use super::grid::Effort;
-use super::statistics::{FALSE_ALARM, sidak};
 use crate::report::heightfield::{
     Config, Departure, HeightCase, LobeCase, PSI_BINS, outgoing_lobes, visible_heights,
 };
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use smithwalk_validation::plot::{Axis, Chart, Mark, PlotError, Series};
+use smithwalk_validation::statistics::{FALSE_ALARM, sidak};
+use smithwalk_validation::{Case, Check, Effort, Statement};
 
 /// The distances of all cases, over what each may be.
 fn check(subject: &str, departures: &[(String, Departure)]) -> Check {

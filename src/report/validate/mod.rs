@@ -2,13 +2,7 @@
 //! must satisfy, each tested over a grid of configurations, with its statistic,
 //! its bound and the chance of a false alarm.
 //!
-//! Deterministic statements are compared with quadrature over the normals
-//! themselves, statistical ones by standard scores or χ² with a bound that
-//! holds for all cases of a check together (Šidák). Seeds are fixed, so a
-//! verdict is reproducible, and does not depend on the number of threads.
-//!
-//! The model under test is a [`Model`]: [`Smithwalk`], or a faulty one, to see
-//! that the fault is found.
+//! All but 10 and 11, which need an explicit surface, are [`smithwalk_validation`].
 //!
 //! ```no_run
 //! use smithwalk::report::validate::{Effort, validate};
@@ -19,30 +13,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod check;
-mod closed;
-mod escape;
 mod explicit;
-mod grid;
-mod model;
-mod orders;
 mod page;
-mod phases;
-mod precision;
-mod slopes;
-mod statistics;
-mod transport;
 
-pub use check::{Case, Check, Statement};
-pub use grid::Effort;
-pub use model::{Distribution, Model, Rng, Smithwalk, stream, uniform};
-pub use orders::{OrderRow, table as order_table};
-pub use precision::PrecisionRow;
-pub use statistics::FALSE_ALARM;
+pub use smithwalk_validation::{
+    Case, Check, Effort, FALSE_ALARM, OrderRow, PrecisionRow, Smithwalk, Statement,
+};
 
 use super::heightfield::HeightFieldError;
-use super::plot::PlotError;
 use serde::Serialize;
+use smithwalk_validation::plot::PlotError;
+use smithwalk_validation::{STATEMENTS, orders, precision, statement};
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -90,28 +71,6 @@ impl Report {
     }
 }
 
-/// Tests one statement about `model`. `None` for 10 and 11, which [`validate`]
-/// tests on an explicit surface, and for numbers that are none.
-pub fn statement<M: Model>(
-    model: M,
-    effort: Effort,
-    number: u32,
-) -> Option<Result<Statement, PlotError>> {
-    Some(match number {
-        1 => escape::one_direction(model, effort),
-        2 => escape::two_directions(model, effort),
-        3 => escape::after_one_bounce(model, effort),
-        4 => phases::normalised(model, effort),
-        5 => phases::reciprocal(model, effort),
-        6 => transport::white_furnace(model, effort),
-        7 => transport::reciprocal(model, effort),
-        8 => transport::single_scattering(model, effort),
-        9 => escape::weak_white_furnace(model, effort),
-        12 => closed::closed_form(model, effort),
-        _ => return None,
-    })
-}
-
 /// Tests everything; `progress` hears of each statement as it is done.
 pub fn validate(
     effort: Effort,
@@ -119,7 +78,7 @@ pub fn validate(
 ) -> Result<Report, ValidateError> {
     let start = std::time::Instant::now();
     let mut statements = Vec::new();
-    for number in 1..=12 {
+    for number in 1..=STATEMENTS {
         let found = match number {
             10 => explicit::heights(effort)?,
             11 => explicit::lobes(effort)?,

@@ -1,7 +1,7 @@
 //! The report as text and as a page of HTML.
 
-use super::orders::{CAP_LOSS, OrderRow};
-use super::{Check, Report};
+use super::{Check, OrderRow, Report};
+use smithwalk_validation::orders::CAP_LOSS;
 use std::fmt::Write;
 
 /// A number with three significant digits.

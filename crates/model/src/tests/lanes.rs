@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::lanes::{Directions, NdfLanes, erf_inv_of_twice_less_one, ierfc};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::fmt::Debug;
 use wide::f32x8;
 

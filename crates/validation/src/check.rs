@@ -115,7 +115,7 @@ impl Check {
 /// One of the statements that the model must satisfy.
 #[derive(Clone, Debug, Serialize)]
 pub struct Statement {
-    /// Its number, 1 to 12.
+    /// Its number.
     pub number: u32,
     /// What holds, in words.
     pub title: &'static str,

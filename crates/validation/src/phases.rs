@@ -5,7 +5,7 @@ use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream};
 use super::slopes::Slopes;
 use super::statistics::{Mean, chi_square, gauss};
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use crate::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use smithwalk_model::{At, Draw, Facets, Ndf, Side, Vector3, fresnel};
 use std::f64::consts::TAU;

@@ -3,7 +3,7 @@
 use super::grid::Effort;
 use super::model::Distribution;
 use super::model::{Model, stream};
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use crate::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use serde::Serialize;
 use smithwalk_model::{Estimator, Facets, Ggx, Microsurface, PerOrder, Vector3};

@@ -1,11 +1,11 @@
 //! The validation finds faults: each test plants one into the model, and a
 //! statement that must see it does not hold any more.
 
-use smithwalk::report::validate::{Distribution, Effort, Model, Smithwalk, statement};
 use smithwalk_model::{
-    At, Bounce, Conductor, Dielectric, Diffuse, Draw, Estimator, Exit, Facets, Microsurface, Ndf,
-    Phase, Side, Tally, Vector3,
+    At, Bounce, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Estimator, Exit, Facets,
+    Microsurface, Ndf, Phase, Side, Tally, Vector3,
 };
+use smithwalk_validation::{Distribution, Effort, Model, Smithwalk, statement};
 
 /// What is wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,8 +139,8 @@ impl Model for Faulty {
         FaultyNdf(d, self.0)
     }
 
-    fn conductor(self) -> Conductor<f64> {
-        Smithwalk.conductor()
+    fn metal(self, fresnel: ConductorFresnel<f64>) -> Conductor<f64> {
+        Conductor { fresnel }
     }
 
     fn dielectric(self, eta: f64) -> FaultyGlass {
@@ -223,7 +223,7 @@ fn is_found(fault: Fault, by: u32) {
 
 #[test]
 fn without_a_fault_the_wrapped_model_holds() {
-    for number in [1, 2, 3, 4, 5, 6, 7, 9] {
+    for number in [1, 2, 3, 4, 5, 6, 7, 9, 13] {
         assert!(holds(Fault::None, number), "statement {number}");
     }
 }
@@ -237,6 +237,7 @@ fn a_wrong_sign_of_lambda_is_found() {
 fn missing_masking_is_found() {
     is_found(Fault::NoMasking, 2);
     is_found(Fault::NoMasking, 3);
+    is_found(Fault::NoMasking, 13);
 }
 
 #[test]

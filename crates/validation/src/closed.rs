@@ -3,10 +3,11 @@
 use super::check::{Case, Check, Statement};
 use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream, uniform};
+use super::points::{REPLICATES, replicated};
 use super::statistics::{Mean, chi_square, gauss};
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use crate::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
-use smithwalk_model::{Draw, Estimator, Microsurface, Quadratic, Split, Total, Vector3};
+use smithwalk_model::{Estimator, Microsurface, Quadratic, Split, Total, Vector3};
 use std::f64::consts::TAU;
 
 /// The relative standard error that the full effort reaches for every pair.
@@ -32,36 +33,6 @@ fn pairs(count: usize, least: f64) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     (0..count).map(|_| (direction(), direction())).collect()
 }
 
-/// How many times a mean is taken with another scrambling, to know its error.
-const REPLICATES: u32 = 32;
-
-/// Dimensions that are stratified: the first orders of both walks.
-const STRATIFIED: u32 = 16;
-
-/// Owen-scrambled Sobol points (Burley 2020), and random numbers past their
-/// first dimensions.
-struct Sobol {
-    index: u32,
-    seed: u32,
-    dimension: u32,
-    block: [f32; 4],
-    rest: Rng,
-}
-
-impl Draw<f64> for Sobol {
-    fn draw(&mut self) -> f64 {
-        let d = self.dimension;
-        self.dimension += 1;
-        if d >= STRATIFIED {
-            return uniform(&mut self.rest);
-        }
-        if d % 4 == 0 {
-            self.block = sobol_burley::sample_4d(self.index, d / 4, self.seed);
-        }
-        f64::from(self.block[(d % 4) as usize])
-    }
-}
-
 /// The estimator's mean, with enough samples for a relative standard error of
 /// `precision`. Their number is set by a run of its own, so that it does not
 /// depend on what is tested.
@@ -74,32 +45,14 @@ fn measure<M: Model>(
     index: usize,
 ) -> Mean {
     const PILOT: u32 = 512;
-    // The length of the sampler's sequence; past it a new one begins.
-    const SEQUENCE: u32 = 1 << 16;
     const MOST: u32 = 1 << 20;
     let run = |samples, first_seed| {
-        let mut means = Mean::default();
-        for replicate in 0..REPLICATES {
-            let seed = first_seed + index as u32 * REPLICATES + replicate;
-            let mut points = Sobol {
-                index: 0,
-                seed,
-                dimension: 0,
-                block: [0.0; 4],
-                rest: stream(120 + estimator as u64, seed as usize),
-            };
-            let mut sum = 0.0;
-            for i in 0..samples {
-                (points.index, points.dimension) = (i % SEQUENCE, 0);
-                // The hash of seeds makes every sequence another scrambling.
-                points.seed = seed ^ (i / SEQUENCE) << 26;
-                let mut total = Total::default();
-                model.eval(surface, estimator, wi, wo, &mut points, &mut total);
-                sum += total.0.0[0];
-            }
-            means.add(sum / f64::from(samples));
-        }
-        means
+        let seed = first_seed + index as u32 * REPLICATES;
+        replicated(120 + estimator as u64, seed, samples, |points| {
+            let mut total = Total::default();
+            model.eval(surface, estimator, wi, wo, points, &mut total);
+            total.0.0[0]
+        })
     };
     let pilot = run(PILOT, 1 << 24);
     let share = pilot.error() / (pilot.mean * precision);

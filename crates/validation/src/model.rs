@@ -87,7 +87,8 @@ impl Ndf for Distribution {
     }
 }
 
-/// An implementation of the microsurface model. [`Smithwalk`] is the crate's;
+/// An implementation of the microsurface model. [`Smithwalk`] is the one
+/// of [`smithwalk_model`];
 /// tests give others, with a part that is wrong, to see it found.
 pub trait Model: Copy + Send + Sync {
     /// Its distributions of normals.
@@ -102,8 +103,13 @@ pub trait Model: Copy + Send + Sync {
     /// The distribution `d`.
     fn ndf(self, d: Distribution) -> Self::Ndf;
 
+    /// Mirrors of this reflectance.
+    fn metal(self, fresnel: ConductorFresnel<f64>) -> Self::Conductor;
+
     /// Mirrors that absorb nothing.
-    fn conductor(self) -> Self::Conductor;
+    fn conductor(self) -> Self::Conductor {
+        self.metal(ConductorFresnel::Constant(Rgb::white()))
+    }
 
     /// Clear facets with the relative index n(below)/n(above) = `eta`.
     fn dielectric(self, eta: f64) -> Self::Dielectric;
@@ -135,7 +141,7 @@ pub trait Model: Copy + Send + Sync {
     }
 }
 
-/// The model of this crate.
+/// The model of [`smithwalk_model`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Smithwalk;
 
@@ -149,10 +155,8 @@ impl Model for Smithwalk {
         d
     }
 
-    fn conductor(self) -> Conductor<f64> {
-        Conductor {
-            fresnel: ConductorFresnel::Constant(Rgb::white()),
-        }
+    fn metal(self, fresnel: ConductorFresnel<f64>) -> Conductor<f64> {
+        Conductor { fresnel }
     }
 
     fn dielectric(self, eta: f64) -> Dielectric<f64> {

@@ -5,7 +5,7 @@ use super::grid::{Effort, cross};
 use super::model::{Distribution, Model, stream};
 use super::slopes::Slopes;
 use super::statistics::Mean;
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use crate::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use smithwalk_model::heights::{Gaussian, Heights, Uniform};
 use smithwalk_model::{At, Estimator, Facets, Microsurface, Ndf, PerOrder, Side, Vector3};

@@ -5,7 +5,7 @@ use super::check::{Case, Check, Statement};
 use super::grid::Effort;
 use super::model::{Distribution, Model, Rng, stream, uniform};
 use super::statistics::Mean;
-use crate::report::plot::{Axis, Chart, Mark, PlotError, Series};
+use crate::plot::{Axis, Chart, Mark, PlotError, Series};
 use rayon::prelude::*;
 use smithwalk_model::{
     Estimator, Facets, Ggx, Microsurface, Ndf, Rgb, Split, Tally, Total, Vector3,
