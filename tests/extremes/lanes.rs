@@ -147,7 +147,7 @@ fn lanes_hold_for_grazing_pairs_on_beckmann() {
 }
 
 fn hold_for_grazing_pairs<N: NdfInLanes + Debug>(new: impl Fn((f32, f32)) -> N + Sync) {
-    let starts: &'static [Vec<f32>; 5] = Box::leak(Box::new(Default::default()));
+    let starts: &'static [Vec<f32>; 5] = Box::leak(Box::default());
     let all = (0..100_000u64).into_par_iter().map(|pair| {
         let mut found = Findings::default();
         let Grazing { alpha, ends } = Grazing::new(&mut stream(pair));
