@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use smithwalk::description::Channel;
+use smithwalk::memory::Budget;
 use smithwalk::mesh::{Mesh, Repair, Wanted};
 use smithwalk::texture::{self, ColorSpace, Interpolation, Texture, load_environment};
 use std::path::PathBuf;
@@ -11,7 +12,8 @@ fn read(text: &str) -> (Mesh, Vec<Repair>) {
 }
 
 fn read_only(text: &str, wanted: Wanted) -> (Mesh, Vec<Repair>) {
-    Mesh::read(text.as_bytes(), "mesh.obj", wanted).unwrap_or_else(|error| panic!("{error}"))
+    Mesh::read(std::io::Cursor::new(text.as_bytes()), "mesh.obj", wanted)
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -86,7 +88,14 @@ fn a_mesh_of_many_faces_is_one_mesh_in_the_order_of_its_file() {
 #[test]
 fn the_line_of_a_mistake_is_known_far_into_a_file_and_on_one_thread() {
     let text = format!("{}v 1 1.2.3 0\n{SQUARE}", "v 1 2 3\n".repeat(MANY));
-    let error = || Mesh::read(text.as_bytes(), "mesh.obj", Wanted::ALL).expect_err("1.2.3");
+    let error = || {
+        Mesh::read(
+            std::io::Cursor::new(text.as_bytes()),
+            "mesh.obj",
+            Wanted::ALL,
+        )
+        .expect_err("1.2.3")
+    };
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1);
     let alone = one_thread.build().unwrap().install(error);
     assert_eq!(
@@ -286,7 +295,7 @@ proptest! {
             text.splice(start..end, replacement.chars());
         }
         let text: String = text.into_iter().collect();
-        match Mesh::read(text.as_bytes(), "mesh.obj", Wanted { uvs, normals }) {
+        match Mesh::read(std::io::Cursor::new(text.as_bytes()), "mesh.obj", Wanted { uvs, normals }) {
             Ok((mesh, _)) => {
                 let count = mesh.positions.len();
                 prop_assert!(mesh.positions.iter().flatten().all(|x| x.is_finite()));
@@ -516,7 +525,7 @@ fn environments_are_mended_and_counted() {
         .write()
         .to_file(&path)
         .unwrap();
-    let (sky, repairs) = load_environment(&path).unwrap();
+    let (sky, repairs) = load_environment(&path, &Budget::of_machine()).unwrap();
     assert_eq!((sky.width, sky.height), (2, 2));
     assert_eq!(
         sky.pixels,

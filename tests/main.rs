@@ -15,6 +15,7 @@ mod extreme_scenes;
 mod extremes;
 mod film_files;
 mod heightfield;
+mod inputs;
 mod light;
 mod parity;
 mod render;

@@ -111,11 +111,7 @@ fn bytes(scene: &Scene) -> [(&'static str, usize); 5] {
         ),
         (
             "textures",
-            scene
-                .textures
-                .iter()
-                .map(smithwalk::texture::Texture::memory)
-                .sum(),
+            smithwalk::texture::Texture::memory(&scene.textures),
         ),
         ("lights", scene.lights.bytes()),
     ]

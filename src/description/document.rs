@@ -3,15 +3,23 @@
 //! `saphyr-parser` says where things are, `serde_yaml` what a scalar means.
 
 use super::problem::{Place, Sources};
+use crate::text::excerpt;
 use saphyr_parser::{Event, Parser, ScalarStyle, Span};
-use serde_yaml::{Mapping, Value};
+use serde::de::IgnoredAny;
+use serde_yaml::Value;
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Deeper files are not scenes, and would overflow the stack of what walks
 /// over them.
-const MAX_DEPTH: usize = 64;
+pub(super) const MAX_DEPTH: usize = 64;
 /// How many nodes aliases may add before a file is taken for an attack.
 const MAX_ALIASED: usize = 1_000_000;
+/// How many bytes may be read again and again for tabs that the parser refuses.
+const MAX_REREAD: usize = 1 << 28;
+/// What the parser says of a tab between a colon and a value, which YAML allows
+/// (1.2.2, 6.2).
+const TAB_REFUSED: &str = "':' must be followed by a valid YAML whitespace";
 
 /// A node of a YAML file.
 #[derive(Clone, Debug)]
@@ -24,16 +32,66 @@ pub(super) struct Node {
 
 #[derive(Clone, Debug)]
 pub(super) enum Kind {
-    Scalar(Value),
+    Scalar(Scalar),
     Sequence(Vec<Node>),
-    /// Keys are unique.
-    Mapping(Vec<(Key, Node)>),
+    Mapping(Mapping),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Scalar {
+    Null,
+    Bool(bool),
+    Unsigned(u64),
+    /// Below zero.
+    Signed(i64),
+    Float(f64),
+    Text(Box<str>),
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Key {
-    pub name: String,
+    pub name: Box<str>,
     pub place: Place,
+}
+
+/// Entries in the order of the file; their keys are unique.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mapping {
+    entries: Vec<(Key, Node)>,
+    /// Where each key is, for mappings of more than [`Mapping::FEW`].
+    index: Option<Box<HashMap<Box<str>, usize>>>,
+}
+
+impl Mapping {
+    /// Up to so many keys are compared one by one: most mappings have less.
+    const FEW: usize = 16;
+
+    pub fn entries(&self) -> &[(Key, Node)] {
+        &self.entries
+    }
+
+    pub fn position(&self, name: &str) -> Option<usize> {
+        match &self.index {
+            Some(index) => index.get(name).copied(),
+            None => self.entries.iter().position(|(key, _)| *key.name == *name),
+        }
+    }
+
+    /// Adds an entry whose key is not there yet.
+    pub fn push(&mut self, key: Key, node: Node) {
+        if let Some(index) = &mut self.index {
+            index.insert(key.name.clone(), self.entries.len());
+        }
+        self.entries.push((key, node));
+        if self.index.is_none() && self.entries.len() > Self::FEW {
+            let names = self.entries.iter().map(|(key, _)| key.name.clone());
+            self.index = Some(Box::new(names.zip(0..).collect()));
+        }
+    }
+
+    pub fn node_mut(&mut self, position: usize) -> &mut Node {
+        &mut self.entries[position].1
+    }
 }
 
 /// One step down from a node.
@@ -62,8 +120,9 @@ impl Node {
         match &self.kind {
             Kind::Scalar(_) => 1,
             Kind::Sequence(items) => 1 + items.iter().map(Node::count).sum::<usize>(),
-            Kind::Mapping(entries) => {
-                1 + entries.iter().map(|(_, node)| node.count()).sum::<usize>()
+            Kind::Mapping(mapping) => {
+                let nodes = mapping.entries.iter();
+                1 + nodes.map(|(_, node)| node.count()).sum::<usize>()
             }
         }
     }
@@ -71,46 +130,26 @@ impl Node {
     /// The entries of a mapping; none for anything else.
     pub fn entries(&self) -> &[(Key, Node)] {
         match &self.kind {
-            Kind::Mapping(entries) => entries,
+            Kind::Mapping(mapping) => mapping.entries(),
             _ => &[],
         }
     }
 
+    fn entry(&self, key: &str) -> Option<&(Key, Node)> {
+        let Kind::Mapping(mapping) = &self.kind else {
+            return None;
+        };
+        Some(&mapping.entries[mapping.position(key)?])
+    }
+
     /// The value of a key, pruned or not.
     pub fn get(&self, key: &str) -> Option<&Node> {
-        self.entries()
-            .iter()
-            .find(|(name, _)| name.name == key)
-            .map(|(_, node)| node)
+        self.entry(key).map(|(_, node)| node)
     }
 
     /// The place of a key.
     pub fn key_place(&self, key: &str) -> Option<Place> {
-        self.entries()
-            .iter()
-            .find(|(name, _)| name.name == key)
-            .map(|(name, _)| name.place)
-    }
-
-    /// What is left after pruning.
-    pub fn to_value(&self) -> Value {
-        match &self.kind {
-            Kind::Scalar(value) => value.clone(),
-            Kind::Sequence(items) => Value::Sequence(
-                items
-                    .iter()
-                    .filter(|item| !item.pruned)
-                    .map(Node::to_value)
-                    .collect(),
-            ),
-            Kind::Mapping(entries) => Value::Mapping(
-                entries
-                    .iter()
-                    .filter(|(_, node)| !node.pruned)
-                    .map(|(key, node)| (Value::String(key.name.clone()), node.to_value()))
-                    .collect::<Mapping>(),
-            ),
-        }
+        self.entry(key).map(|(name, _)| name.place)
     }
 
     /// Follows the steps as far as they lead; gives the last node, and the
@@ -154,10 +193,10 @@ impl Node {
         match &mut self.kind {
             Kind::Scalar(_) => None,
             Kind::Sequence(items) => items.get_mut(first.parse::<usize>().ok()?)?.at_mut(rest),
-            Kind::Mapping(entries) => entries
-                .iter_mut()
-                .find(|(key, _)| key.name == *first)
-                .and_then(|(_, node)| node.at_mut(rest)),
+            Kind::Mapping(mapping) => {
+                let position = mapping.position(first)?;
+                mapping.node_mut(position).at_mut(rest)
+            }
         }
     }
 }
@@ -190,7 +229,7 @@ pub(super) fn parse(
         root: None,
     };
     let mut documents = 0;
-    for event in Parser::new_from_str(text) {
+    for event in Parser::new_from_str(&with_spaces_after_colons(text)) {
         match event {
             Ok((Event::DocumentStart(_), span)) => {
                 documents += 1;
@@ -221,6 +260,35 @@ pub(super) fn parse(
     reader.root
 }
 
+/// The text with spaces for the tabs that the parser refuses; as long, so that
+/// places stay what they are.
+fn with_spaces_after_colons(text: &str) -> Cow<'_, str> {
+    if !text.contains(":\t") {
+        return Cow::Borrowed(text);
+    }
+    // JSON, as many programs indent it: no string of it can hold a tab.
+    if serde_json::from_str::<IgnoredAny>(text).is_ok() {
+        return Cow::Owned(text.replace('\t', " "));
+    }
+    let mut text = text.to_owned();
+    for _ in 0..1 + MAX_REREAD / text.len() {
+        let refused = Parser::new_from_str(&text).find_map(|event| {
+            let error = event.err()?;
+            (error.info() == TAB_REFUSED).then(|| error.marker().index())
+        });
+        let Some(value) = refused else { break };
+        let Some((value, _)) = text.char_indices().nth(value) else {
+            break;
+        };
+        let start = text[..value].trim_end_matches('\t').len();
+        if start == value {
+            break;
+        }
+        text.replace_range(start..value, &" ".repeat(value - start));
+    }
+    Cow::Owned(text)
+}
+
 struct Reader {
     source: usize,
     /// How many characters of the source's first line come before the text.
@@ -240,18 +308,13 @@ impl Reader {
             usize::MAX
         };
         let offset = if line == 1 { self.offset } else { 0 };
-        Place {
-            source: self.source,
-            line,
-            column: column + offset,
-            width: width.max(1),
-        }
+        Place::new(self.source, line, column + offset, width.max(1))
     }
 
     fn path(&self) -> String {
         let steps = self.open.iter().filter_map(|open| match &open.kind {
             Kind::Sequence(items) => Some(items.len().to_string()),
-            _ => open.key.as_ref().map(|key| key.name.clone()),
+            _ => open.key.as_ref().map(|key| key.name.to_string()),
         });
         dotted(&steps.collect::<Vec<_>>())
     }
@@ -271,39 +334,48 @@ impl Reader {
             sources.report(
                 place,
                 self.path(),
-                format!("expected no YAML tag, found `{tag}`"),
+                format!("expected no YAML tag, found `{}`", excerpt(&tag)),
                 None,
             );
         }
         match event {
             Event::Scalar(text, style, anchor, _) => {
-                let mut node = Node::new(Kind::Scalar(scalar(&text, style)), place);
-                if let Kind::Scalar(Value::Number(number)) = &node.kind {
-                    if !number
-                        .as_f64()
-                        .is_some_and(|number| (number as f32).is_finite())
-                    {
-                        let message = format!("expected a finite number, found `{text}`");
-                        sources.report(place, self.path(), message, None);
-                        node.pruned = true;
-                    }
+                let scalar = scalar(&text, style);
+                let number = match scalar {
+                    Scalar::Unsigned(number) => number as f64,
+                    Scalar::Signed(number) => number as f64,
+                    Scalar::Float(number) => number,
+                    _ => 0.0,
+                };
+                let mut node = Node::new(Kind::Scalar(scalar), place);
+                if !(number as f32).is_finite() {
+                    let text = excerpt(&text);
+                    let message = format!("expected a finite number, found `{text}`");
+                    sources.report(place, self.path(), message, None);
+                    node.pruned = true;
                 }
-                self.add(node, anchor, Some(text.into_owned()), sources);
+                self.add(node, anchor, Some(&text), sources);
             }
             Event::SequenceStart(anchor, _) => {
                 self.begin(Kind::Sequence(Vec::new()), place, anchor, sources)?
             }
             Event::MappingStart(anchor, _) => {
-                self.begin(Kind::Mapping(Vec::new()), place, anchor, sources)?
+                self.begin(Kind::Mapping(Mapping::default()), place, anchor, sources)?
             }
             Event::SequenceEnd | Event::MappingEnd => {
                 if let Some(Open {
-                    kind,
+                    mut kind,
                     place,
                     anchor,
                     ..
                 }) = self.open.pop()
                 {
+                    // Millions of them are what a large scene consists of.
+                    match &mut kind {
+                        Kind::Scalar(_) => {}
+                        Kind::Sequence(items) => items.shrink_to_fit(),
+                        Kind::Mapping(mapping) => mapping.entries.shrink_to_fit(),
+                    }
                     self.add(Node::new(kind, place), anchor, None, sources);
                 }
             }
@@ -362,54 +434,84 @@ impl Reader {
     }
 
     /// Puts a finished node where it belongs. `text` is a scalar's, as written.
-    fn add(&mut self, node: Node, anchor: usize, text: Option<String>, sources: &mut Sources) {
+    fn add(&mut self, node: Node, anchor: usize, text: Option<&str>, sources: &mut Sources) {
         if anchor != 0 {
             self.anchors.insert(anchor, node.clone());
         }
-        let path = self.path();
         let Some(open) = self.open.last_mut() else {
             self.root = Some(node);
             return;
         };
-        match &mut open.kind {
-            Kind::Sequence(items) => items.push(node),
-            Kind::Mapping(entries) => match open.key.take() {
-                Some(_) if open.drop_next => {}
-                Some(key) => entries.push((key, node)),
-                None => {
-                    let first = entries
-                        .iter()
-                        .find(|(key, _)| Some(&key.name) == text.as_ref());
-                    let fault = match (&text, first) {
-                        (None, _) => Some("expected a name as key, found a collection".to_owned()),
-                        (Some(name), Some((key, _))) => Some(format!(
-                            "the key `{name}` is given twice, first in line {}",
-                            key.place.line
-                        )),
-                        (Some(_), None) => None,
-                    };
-                    open.drop_next = fault.is_some();
-                    if let Some(fault) = fault {
-                        sources.report(node.place, path, fault, None);
-                    }
-                    open.key = Some(Key {
-                        name: text.unwrap_or_default(),
-                        place: node.place,
-                    });
-                }
-            },
+        let mapping = match &mut open.kind {
+            Kind::Sequence(items) => return items.push(node),
+            Kind::Mapping(mapping) => mapping,
             Kind::Scalar(_) => unreachable!("scalars are never open"),
+        };
+        if let Some(key) = open.key.take() {
+            if !open.drop_next {
+                mapping.push(key, node);
+            }
+            return;
+        }
+        let place = node.place;
+        let fault = match text {
+            None => Some("expected a name as key, found a collection".to_owned()),
+            Some("<<") => Some(
+                "merge keys are not read: give the keys themselves, or an alias for the whole"
+                    .to_owned(),
+            ),
+            Some(name) => mapping.position(name).map(|first| {
+                let line = mapping.entries[first].0.place.line;
+                let name = excerpt(name);
+                format!("the key `{name}` is given twice, first in line {line}")
+            }),
+        };
+        open.drop_next = fault.is_some();
+        if let Some(fault) = fault {
+            sources.report(place, self.path(), fault, None);
+        }
+        if let Some(open) = self.open.last_mut() {
+            open.key = Some(Key {
+                name: text.unwrap_or_default().into(),
+                place,
+            });
         }
     }
 }
 
 /// The meaning of a scalar: text when quoted, else what YAML says.
-fn scalar(text: &str, style: ScalarStyle) -> Value {
-    let as_text = || Value::String(text.to_owned());
-    match style {
-        ScalarStyle::Plain => match serde_yaml::from_str(text) {
-            Ok(value @ (Value::Null | Value::Bool(_) | Value::Number(_))) => value,
-            _ => as_text(),
+fn scalar(text: &str, style: ScalarStyle) -> Scalar {
+    let as_text = || Scalar::Text(text.into());
+    if style != ScalarStyle::Plain {
+        return as_text();
+    }
+    // Most are names or decimals, which need no parser.
+    const WORDS: [&str; 9] = [
+        "null", "Null", "NULL", "true", "True", "TRUE", "false", "False", "FALSE",
+    ];
+    let digits = |bytes: &[u8]| bytes.len() < 15 && bytes.iter().all(u8::is_ascii_digit);
+    let decimal = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
+    let parsed = match text.as_bytes() {
+        [first, ..] if first.is_ascii_alphabetic() && !WORDS.contains(&text) => return as_text(),
+        [b'1'..=b'9', rest @ ..] if digits(rest) => text.parse().ok().map(Scalar::Unsigned),
+        [b'-', b'1'..=b'9', rest @ ..] if digits(rest) => text.parse().ok().map(Scalar::Signed),
+        [b'0'..=b'9', rest @ ..] | [b'-', b'0'..=b'9', rest @ ..]
+            if rest.contains(&b'.') && rest.iter().all(decimal) =>
+        {
+            text.parse().ok().map(Scalar::Float)
+        }
+        _ => None,
+    };
+    if let Some(scalar) = parsed {
+        return scalar;
+    }
+    match serde_yaml::from_str(text) {
+        Ok(Value::Null) => Scalar::Null,
+        Ok(Value::Bool(flag)) => Scalar::Bool(flag),
+        Ok(Value::Number(number)) => match (number.as_u64(), number.as_i64()) {
+            (Some(number), _) => Scalar::Unsigned(number),
+            (None, Some(number)) => Scalar::Signed(number),
+            (None, None) => Scalar::Float(number.as_f64().unwrap_or(f64::NAN)),
         },
         _ => as_text(),
     }
@@ -419,6 +521,25 @@ fn scalar(text: &str, style: ScalarStyle) -> Value {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use serde_yaml::Mapping as YamlMapping;
+
+    fn value_of(node: &Node) -> Value {
+        match &node.kind {
+            Kind::Scalar(Scalar::Null) => Value::Null,
+            Kind::Scalar(Scalar::Bool(flag)) => Value::Bool(*flag),
+            Kind::Scalar(Scalar::Unsigned(number)) => Value::Number((*number).into()),
+            Kind::Scalar(Scalar::Signed(number)) => Value::Number((*number).into()),
+            Kind::Scalar(Scalar::Float(number)) => Value::Number((*number).into()),
+            Kind::Scalar(Scalar::Text(text)) => Value::String(text.to_string()),
+            Kind::Sequence(items) => Value::Sequence(items.iter().map(value_of).collect()),
+            Kind::Mapping(mapping) => {
+                let entries = mapping.entries.iter();
+                let entries = entries
+                    .map(|(key, node)| (Value::String(key.name.to_string()), value_of(node)));
+                Value::Mapping(entries.collect::<YamlMapping>())
+            }
+        }
+    }
 
     /// The tree and whether anything was reported.
     fn tree_of(text: &str) -> (Option<Node>, bool) {
@@ -441,7 +562,7 @@ mod tests {
                     };
                     Some((Value::String(name), with_names_as_keys(value)?))
                 })
-                .collect::<Option<Mapping>>()
+                .collect::<Option<YamlMapping>>()
                 .map(Value::Mapping),
             Value::Sequence(items) => items
                 .into_iter()
@@ -457,7 +578,7 @@ mod tests {
             panic!("expected a tree of {text}")
         };
         assert_eq!(
-            tree.to_value(),
+            value_of(&tree),
             serde_yaml::from_str::<Value>(text).unwrap(),
             "{text}"
         );
@@ -526,7 +647,7 @@ mod tests {
         fn flow_texts_mean_what_serde_yaml_reads(text in "(\\{|\\[|\\}|\\]|, |: |a|b: |c |'d'|1|-2|\n| ){0,16}") {
             if let ((Some(tree), false), Ok(value)) = (tree_of(&text), serde_yaml::from_str::<Value>(&text)) {
                 if let Some(value) = with_names_as_keys(value) {
-                    prop_assert_eq!(tree.to_value(), value);
+                    prop_assert_eq!(value_of(&tree), value);
                 }
             }
         }

@@ -8,6 +8,7 @@ mod document;
 mod light;
 mod material;
 mod mixes;
+mod node;
 mod overrides;
 mod problem;
 mod read;
@@ -16,6 +17,7 @@ mod transform;
 mod validate;
 mod value;
 
+pub use crate::texture::{Channel, ColorSpace, Interpolation};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
 };
@@ -27,14 +29,30 @@ pub use material::{
 pub use problem::{Problem, Problems};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
-pub use value::{Channel, Color, Scalar};
+pub use value::{Color, Scalar};
 
 use problem::Sources;
 
-use crate::texture::{ColorSpace, Interpolation};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// How files begin that are given for scenes by mistake, and what to say.
+const OTHER_FORMATS: [(&[u8], &str); 7] = [
+    (
+        b"BLENDER",
+        "a Blender file: blender/export.py makes a scene of it",
+    ),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "a Zstandard file, as of Blender: blender/export.py makes a scene of it",
+    ),
+    (b"\x1f\x8b", "a gzip file"),
+    (b"PK\x03\x04", "a ZIP file"),
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xfe", "UTF-16: save it as UTF-8"),
+    (b"\xfe\xff", "UTF-16: save it as UTF-8"),
+];
 
 /// A whole scene file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -86,8 +104,15 @@ impl Description {
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, Problems> {
         let name = path.display().to_string();
         let whole = |message| Problems::new(vec![Problem::of_source(&name, message)]);
-        let bytes = std::fs::read(path)
-            .map_err(|error| whole(format!("the scene can't be read: {error}")))?;
+        let cannot_read = |error| whole(format!("the scene can't be read: {error}"));
+        let mut file = crate::file::open(path).map_err(cannot_read)?;
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut file, &mut bytes).map_err(cannot_read)?;
+        for (beginning, found) in OTHER_FORMATS {
+            if bytes.starts_with(beginning) {
+                return Err(whole(format!("expected a scene in YAML, found {found}")));
+            }
+        }
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();
             let line = error.as_bytes()[..valid]
@@ -111,6 +136,7 @@ impl Description {
         source_name: &str,
         overrides: &[(String, String)],
     ) -> Result<Self, Problems> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut sources = Sources::default();
         let source = sources.add(source_name, text);
         let tree = document::parse(text, source, 0, &mut sources);

@@ -1,29 +1,24 @@
 //! Values given on the command line as `path=value`.
 
-use super::document::{Key, Kind, Node, dotted, parse};
+use super::document::{Key, Kind, MAX_DEPTH, Mapping, Node, Scalar, dotted, parse};
 use super::problem::{Place, Sources, nearest};
 use super::read::describe;
-use serde_yaml::Value;
+use crate::text::excerpt;
 
 /// The sections whose keys are names that the file chooses.
 const NAMED: [&str; 3] = ["textures", "materials", "meshes"];
 
 /// Sets the value at a dotted path. Keys that the file leaves out are added,
 /// for whoever deserialises the tree to judge; names are not.
-pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sources) {
-    let source = sources.add("-D", &format!("{path}={value}"));
+pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sources<'_>) {
+    let source = sources.add("-D", format!("{path}={value}"));
     let offset = path.chars().count() + 1;
-    let place = Place {
-        source,
-        line: 1,
-        column: 1,
-        width: offset - 1,
-    };
+    let place = Place::new(source, 1, 1, offset - 1);
     if path.split('.').any(str::is_empty) {
         sources.report(
             place,
             String::new(),
-            format!("expected keys joined by dots, found `{path}`"),
+            format!("expected keys joined by dots, found `{}`", excerpt(path)),
             None,
         );
         return;
@@ -44,6 +39,11 @@ pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sour
     let mut target = root;
     let mut walked = Vec::new();
     while !segments.is_empty() {
+        if walked.len() == MAX_DEPTH {
+            let message = format!("expected at most {MAX_DEPTH} keys joined by dots");
+            sources.report(place, dotted(&walked), message, None);
+            return;
+        }
         match step(target, segments, &walked, place) {
             Ok((next, taken)) => {
                 target = next;
@@ -73,14 +73,14 @@ fn step<'tree>(
     place: Place,
 ) -> Result<(&'tree mut Node, usize), Refusal> {
     let found = describe(node);
-    if let Kind::Scalar(Value::Null) = node.kind {
-        node.kind = Kind::Mapping(Vec::new());
+    if let Kind::Scalar(Scalar::Null) = node.kind {
+        node.kind = Kind::Mapping(Mapping::default());
     }
     match &mut node.kind {
         Kind::Scalar(_) => {
             let message = format!(
                 "expected something with a key `{}`, found {found}",
-                segments[0]
+                excerpt(segments[0])
             );
             Err(Refusal {
                 message,
@@ -96,39 +96,51 @@ fn step<'tree>(
             index
                 .map(|index| (&mut items[index], 1))
                 .ok_or_else(|| Refusal {
-                    message: format!("expected an index below {count}, found `{}`", segments[0]),
+                    message: format!(
+                        "expected an index below {count}, found `{}`",
+                        excerpt(segments[0])
+                    ),
                     nearest: None,
                 })
         }
-        Kind::Mapping(entries) => {
-            let taken = (1..=segments.len()).rev().find(|&taken| {
-                let name = segments[..taken].join(".");
-                entries.iter().any(|(key, _)| key.name == name)
-            });
-            let taken = match (taken, walked) {
-                (Some(taken), _) => taken,
+        Kind::Mapping(mapping) => {
+            // Names are not longer than this, and long paths have many beginnings.
+            let longest = mapping
+                .entries()
+                .iter()
+                .map(|(key, _)| key.name.len())
+                .max();
+            let mut name = String::new();
+            let mut found = None;
+            for (taken, segment) in segments.iter().enumerate() {
+                name.push_str(if taken > 0 { "." } else { "" });
+                name.push_str(segment);
+                if longest.is_none_or(|longest| name.len() > longest) {
+                    break;
+                }
+                if let Some(position) = mapping.position(&name) {
+                    found = Some((position, taken + 1));
+                }
+            }
+            let (position, taken) = match (found, walked) {
+                (Some(found), _) => found,
                 (None, [section]) if NAMED.contains(&section.as_str()) => {
-                    let names = entries.iter().map(|(key, _)| key.name.as_str());
+                    let names = mapping.entries().iter().map(|(key, _)| &*key.name);
                     return Err(Refusal {
-                        message: format!("the scene has no `{}` here", segments[0]),
+                        message: format!("the scene has no `{}` here", excerpt(segments[0])),
                         nearest: nearest(segments[0], names),
                     });
                 }
                 (None, _) => {
                     let key = Key {
-                        name: segments[0].to_owned(),
+                        name: segments[0].into(),
                         place,
                     };
-                    entries.push((key, Node::new(Kind::Scalar(Value::Null), place)));
-                    1
+                    mapping.push(key, Node::new(Kind::Scalar(Scalar::Null), place));
+                    (mapping.entries().len() - 1, 1)
                 }
             };
-            let name = segments[..taken].join(".");
-            let index = entries
-                .iter()
-                .position(|(key, _)| key.name == name)
-                .expect("found or added above");
-            Ok((&mut entries[index].1, taken))
+            Ok((mapping.node_mut(position), taken))
         }
     }
 }

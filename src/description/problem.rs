@@ -1,5 +1,7 @@
 //! What is wrong with a scene file, told to the person who wrote it.
 
+use crate::text::bounded;
+use std::borrow::Cow;
 use std::fmt;
 
 /// One thing wrong with a scene file.
@@ -18,6 +20,8 @@ pub struct Problem {
     /// The known name that looks most like an unknown one.
     pub nearest: Option<String>,
     excerpt: String,
+    /// Characters of the excerpt before the place.
+    indent: usize,
     width: usize,
     /// Which source, in the order of reading.
     order: usize,
@@ -34,6 +38,7 @@ impl Problem {
             message,
             nearest: None,
             excerpt: String::new(),
+            indent: 0,
             width: 0,
             order: 0,
         }
@@ -89,7 +94,7 @@ impl fmt::Display for Problem {
             let indent: String = self
                 .excerpt
                 .chars()
-                .take(self.column - 1)
+                .take(self.indent)
                 .map(|c| if c == '\t' { '\t' } else { ' ' })
                 .collect();
             write!(
@@ -103,33 +108,77 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Where something stands in one of the sources.
+/// Where something stands in one of the sources. Small, since every node has one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     /// The index of the source.
-    pub source: usize,
+    pub source: u32,
     /// Counted from 1.
-    pub line: usize,
+    pub line: u32,
     /// In characters, counted from 1.
-    pub column: usize,
+    pub column: u32,
     /// In characters; 1 for what has no text of its own.
-    pub width: usize,
+    pub width: u32,
+}
+
+impl Place {
+    /// Numbers beyond 32 bits stay at the largest.
+    pub fn new(source: usize, line: usize, column: usize, width: usize) -> Self {
+        let [source, line, column, width] =
+            [source, line, column, width].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
+        Self {
+            source,
+            line,
+            column,
+            width,
+        }
+    }
 }
 
 /// The texts that a description is read from, and what is wrong with them.
 #[derive(Default)]
-pub(super) struct Sources {
-    texts: Vec<(String, String)>,
+pub(super) struct Sources<'a> {
+    texts: Vec<(String, Cow<'a, str>)>,
     problems: Vec<Problem>,
 }
 
 /// Past this many, further problems are more likely to bury the cause.
 const MAX_PROBLEMS: usize = 50;
+/// In bytes; longer names are not compared with others.
+const MAX_NAME: usize = 200;
+/// In bytes; longer messages and paths are cut.
+const MAX_MESSAGE: usize = 1000;
+/// In characters: what is shown of a line, and how far before the place it
+/// starts if the line is longer.
+const EXCERPT: usize = 160;
+const BEFORE: usize = 60;
 
-impl Sources {
+/// What is shown of a line, and how many of its characters come before `column`,
+/// counted from 1.
+fn excerpt(line: &str, column: usize) -> (String, usize) {
+    let start = match line.chars().nth(EXCERPT) {
+        Some(_) => (column - 1).saturating_sub(BEFORE),
+        None => 0,
+    };
+    let shown = line.chars().skip(start).take(EXCERPT);
+    // What moves the cursor would move the caret away from the place.
+    let shown = shown.map(|c| {
+        if c.is_control() && c != '\t' {
+            '\u{fffd}'
+        } else {
+            c
+        }
+    });
+    let before = if start > 0 { "…" } else { "" };
+    let excerpt: String = before.chars().chain(shown).collect();
+    let indent = column - 1 - start + before.chars().count();
+    (excerpt.trim_end().to_owned(), indent)
+}
+
+impl<'a> Sources<'a> {
     /// Adds a text and gives its index.
-    pub fn add(&mut self, name: &str, text: &str) -> usize {
-        self.texts.push((name.to_owned(), text.to_owned()));
+    pub fn add(&mut self, name: &str, text: impl Into<Cow<'a, str>>) -> usize {
+        self.texts.push((name.to_owned(), text.into()));
         self.texts.len() - 1
     }
 
@@ -137,30 +186,31 @@ impl Sources {
         if self.is_full() {
             return;
         }
-        let (name, text) = &self.texts[place.source];
-        let mut place = place;
-        let excerpt = match text.lines().nth(place.line - 1) {
+        let (name, text) = &self.texts[place.source as usize];
+        let (mut number, mut column) = (place.line as usize, place.column as usize);
+        let line = match text.lines().nth(number - 1) {
             Some(line) => line,
             // The end of the text is shown behind its last line.
             None => {
                 let last = text.lines().last().unwrap_or_default();
-                place.line = text.lines().count().max(1);
-                place.column = last.chars().count() + 1;
+                number = text.lines().count().max(1);
+                column = last.chars().count() + 1;
                 last
             }
         };
-        let excerpt = excerpt.trim_end().to_owned();
-        let room = excerpt.chars().count().saturating_sub(place.column - 1);
+        let (excerpt, indent) = excerpt(line, column);
+        let room = excerpt.chars().count().saturating_sub(indent);
         self.problems.push(Problem {
             source: name.clone(),
-            line: place.line,
-            column: place.column,
-            path,
-            message,
+            line: number,
+            column,
+            path: bounded(&path, MAX_MESSAGE),
+            message: bounded(&message, MAX_MESSAGE),
             nearest,
             excerpt,
-            width: place.width.min(room).max(1),
-            order: place.source,
+            indent,
+            width: (place.width as usize).min(room).max(1),
+            order: place.source as usize,
         });
     }
 
@@ -188,8 +238,11 @@ pub(super) fn nearest<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
+    // Longer names are no slip of the pen, and take long to compare.
+    let comparable = |name: &str| name.len() <= MAX_NAME;
     candidates
         .into_iter()
+        .filter(|candidate| comparable(name) && comparable(candidate))
         .map(|candidate| {
             (
                 strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase()),

@@ -1,12 +1,11 @@
 //! From a tree of nodes to typed values, collecting all errors on the way.
 
-use super::document::{Kind, Node, Step, dotted};
+use super::document::{Kind, Node, Scalar, Step, dotted};
 use super::problem::{Place, Sources, nearest};
 use super::value::CLASH_SEPARATOR;
+use crate::text::excerpt;
 use serde::de::DeserializeOwned;
 use serde_path_to_error::Segment;
-use serde_yaml::Value;
-use serde_yaml::with::singleton_map_recursive;
 
 /// Deserialises a tree. Serde stops at the first error, so what it stumbles
 /// over is reported, cut off, and the rest tried again; errors that only
@@ -14,8 +13,8 @@ use serde_yaml::with::singleton_map_recursive;
 pub(super) fn read<T: DeserializeOwned>(tree: &mut Node, sources: &mut Sources) -> Option<T> {
     loop {
         let mut track = serde_path_to_error::Track::new();
-        let deserializer = serde_path_to_error::Deserializer::new(tree.to_value(), &mut track);
-        let error = match singleton_map_recursive::deserialize::<T, _>(deserializer) {
+        let deserializer = serde_path_to_error::Deserializer::new(&*tree, &mut track);
+        let error = match T::deserialize(deserializer) {
             Ok(value) => return Some(value),
             Err(error) => Fault::parse(&error.to_string()),
         };
@@ -33,8 +32,9 @@ fn step(segment: &Segment) -> Option<Step> {
     match segment {
         Segment::Seq { index } => Some(Step::Index(*index)),
         Segment::Map { key } => Some(Step::Key(key.clone())),
-        // Enums are written as mappings, whose key says the same again.
-        Segment::Enum { .. } | Segment::Unknown => None,
+        // Enums are written as mappings.
+        Segment::Enum { variant } => Some(Step::Key(variant.clone())),
+        Segment::Unknown => None,
     }
 }
 
@@ -122,19 +122,23 @@ impl Fault {
         let has_cut = match &node.kind {
             Kind::Scalar(_) => false,
             Kind::Sequence(items) => items.iter().any(|item| item.pruned),
-            Kind::Mapping(entries) => entries.iter().any(|(_, value)| value.pruned),
+            Kind::Mapping(_) => node.entries().iter().any(|(_, value)| value.pruned),
         };
         match self {
             Self::UnknownKey { name, known } => {
                 let (path, place) = locate(&name);
-                let message = format!("unknown key `{name}`, expected {}", one_of(&known));
+                let message = format!(
+                    "unknown key `{}`, expected {}",
+                    excerpt(&name),
+                    one_of(&known)
+                );
                 let nearest = nearest(&name, known.iter().map(String::as_str));
                 sources.report(place, dotted(&path), message, nearest);
                 path
             }
             Self::UnknownVariant { name, known } => {
                 let (path, place) = locate(&name);
-                let message = format!("expected {}, found `{name}`", one_of(&known));
+                let message = format!("expected {}, found `{}`", one_of(&known), excerpt(&name));
                 let nearest = nearest(&name, known.iter().map(String::as_str));
                 sources.report(place, dotted(&path), message, nearest);
                 path
@@ -163,9 +167,9 @@ impl Fault {
             Self::Mismatch { .. } | Self::Other(_) if has_cut => path.to_vec(),
             Self::Mismatch { expected } => {
                 let found = match &node.kind {
-                    Kind::Mapping(entries) if entries.len() > 1 => {
-                        let keys: Vec<_> =
-                            entries.iter().map(|(key, _)| key.name.clone()).collect();
+                    Kind::Mapping(_) if node.entries().len() > 1 => {
+                        let keys = node.entries().iter();
+                        let keys: Vec<_> = keys.map(|(key, _)| excerpt(&key.name)).collect();
                         format!("the keys `{}`", keys.join("`, `"))
                     }
                     _ => describe(node),
@@ -219,11 +223,12 @@ fn plain(expected: &str) -> String {
 
 pub(super) fn describe(node: &Node) -> String {
     match &node.kind {
-        Kind::Scalar(Value::Null) => "nothing".to_owned(),
-        Kind::Scalar(Value::Bool(flag)) => format!("`{flag}`"),
-        Kind::Scalar(Value::Number(number)) => format!("the number {number}"),
-        Kind::Scalar(Value::String(text)) => format!("the text `{text}`"),
-        Kind::Scalar(_) => "something else".to_owned(),
+        Kind::Scalar(Scalar::Null) => "nothing".to_owned(),
+        Kind::Scalar(Scalar::Bool(flag)) => format!("`{flag}`"),
+        Kind::Scalar(Scalar::Unsigned(number)) => format!("the number {number}"),
+        Kind::Scalar(Scalar::Signed(number)) => format!("the number {number}"),
+        Kind::Scalar(Scalar::Float(number)) => format!("the number {number:?}"),
+        Kind::Scalar(Scalar::Text(text)) => format!("the text `{}`", excerpt(text)),
         Kind::Sequence(items) => format!("a list of {}", items.len()),
         Kind::Mapping(_) => "a mapping".to_owned(),
     }

@@ -8,6 +8,7 @@ use super::{
     LightKind, Material, MaterialRef, Object, Opening, Projection, Reflectance, Rough, Roughness,
     Sampling, Scalar, Texture, Transform, World,
 };
+use crate::text::excerpt;
 use std::collections::BTreeSet;
 
 /// In pixels. More would need over 10 GB for the sums alone.
@@ -123,14 +124,14 @@ enum Use {
     Direction,
 }
 
-struct Check<'a> {
+struct Check<'a, 's> {
     tree: &'a Node,
-    sources: &'a mut Sources,
+    sources: &'a mut Sources<'s>,
     /// Whether there are materials and textures to name.
     in_scene: bool,
 }
 
-impl Check<'_> {
+impl Check<'_, '_> {
     fn report(&mut self, at: At, message: String) {
         self.report_near(at, message, None);
     }
@@ -180,7 +181,8 @@ impl Check<'_> {
             self.report(
                 at,
                 format!(
-                    "expected a value, found the {what} `{name}`: there is no scene to take it from"
+                    "expected a value, found the {what} `{}`: there is no scene to take it from",
+                    excerpt(name)
                 ),
             );
             return;
@@ -190,11 +192,19 @@ impl Check<'_> {
             .get(section)
             .map(Node::entries)
             .unwrap_or_default();
-        if names.iter().any(|(key, _)| key.name == name) {
+        if self
+            .tree
+            .get(section)
+            .is_some_and(|names| names.get(name).is_some())
+        {
             return;
         }
-        let nearest = nearest(name, names.iter().map(|(key, _)| key.name.as_str()));
-        self.report_near(at, format!("there is no {what} `{name}`"), nearest);
+        let nearest = nearest(name, names.iter().map(|(key, _)| &*key.name));
+        self.report_near(
+            at,
+            format!("there is no {what} `{}`", excerpt(name)),
+            nearest,
+        );
     }
 
     fn transform(&mut self, transform: &Transform, usage: Use, at: At) {

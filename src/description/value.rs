@@ -1,5 +1,6 @@
 //! Values that may be written in more than one way.
 
+use crate::texture::Channel;
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use std::fmt;
@@ -30,23 +31,6 @@ pub enum Color {
 impl Color {
     /// Grey of value 1: leaves what it multiplies as it is.
     pub const WHITE: Self = Self::Value([1.0; 3]);
-}
-
-/// The part of a texture that stands for a number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Channel {
-    /// Red.
-    R,
-    /// Green.
-    G,
-    /// Blue.
-    B,
-    /// Alpha.
-    A,
-    /// The Rec. 709 luminance of the linear colour.
-    #[default]
-    Luminance,
 }
 
 /// Two keys that exclude each other, or one that lacks its partner.

@@ -100,7 +100,7 @@ pub struct Accelerator {
     /// place: kept for as long as the root scene is.
     _shared: Vec<RawScene>,
     _buffers: Vec<SharedMesh>,
-    _device: Arc<Device>,
+    device: Arc<Device>,
 }
 
 // SAFETY: Embree's queries on a committed scene are thread safe, nothing here
@@ -117,7 +117,8 @@ impl Accelerator {
     /// `i` in a [`Hit`]; instances refer to `shared`.
     ///
     /// # Errors
-    /// When an index is out of range or Embree runs out of memory.
+    /// When an index is out of range or Embree runs out of memory, or out of what
+    /// its device may hold.
     pub fn build(
         device: Arc<Device>,
         shared: &[SharedMesh],
@@ -161,8 +162,15 @@ impl Accelerator {
             root,
             _shared: shared_scenes,
             _buffers: buffers,
-            _device: device,
+            device,
         })
+    }
+
+    /// The bytes that the structures take, those of vertices and triangles not
+    /// counted.
+    #[must_use]
+    pub fn memory(&self) -> u64 {
+        self.device.memory()
     }
 
     /// The nearest hit along `ray`, if there is one.
@@ -329,6 +337,26 @@ mod tests {
     }
 
     const DOWN: Vec3 = vec3(0.0, 0.0, -1.0);
+
+    #[test]
+    fn no_more_memory_is_taken_than_the_device_may_hold() {
+        let corner = |i: u16| [f32::from(i % 100), f32::from(i / 100), 0.0];
+        let vertices: Vertices = (0..10_000).map(corner).collect::<Vec<_>>().into();
+        let triangles: Vec<[u32; 3]> = (0..9_800).map(|i| [i, i + 1, i + 100]).collect();
+        let mesh = Geometry::Mesh {
+            vertices: Arc::new(vertices),
+            triangles: Arc::new(triangles),
+        };
+        let build = |limit| {
+            let device = Device::with_limit(1, limit).expect("Embree is installed");
+            Accelerator::build(Arc::new(device), &[], std::slice::from_ref(&mesh))
+        };
+        let needed = build(u64::MAX).expect("there is room").memory();
+        assert!((300_000..5_000_000).contains(&needed), "{needed}");
+        assert!(build(4 * needed).is_ok());
+        let error = build(needed / 2).expect_err("there is no room");
+        assert!(matches!(error, EmbreeError::Memory(_)), "{error}");
+    }
 
     #[test]
     fn finds_the_hit_and_its_barycentric_weights() {

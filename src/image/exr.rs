@@ -1,14 +1,16 @@
 //! OpenEXR, scene-linear: our own files, and what Blender writes.
 
-use std::io::{Cursor, Seek, Write};
+use std::io::{Cursor, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatImage, FlatSamples, ImageAttributes,
-    IntegerBounds, LayerAttributes, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+    IntegerBounds, LayerAttributes, Text, Vec2, WritableImage,
 };
 
+use super::planes::{Plane, find_color, join, read_flat, text};
 use super::{Image, Layer, Window};
+use crate::memory::Budget;
 
 /// Why an OpenEXR file can't be used.
 #[derive(Debug, thiserror::Error)]
@@ -51,16 +53,20 @@ pub enum ExrError {
 ///
 /// The colour is, in this order, the channels `R`, `G`, `B`; the one layer
 /// called `Combined`, as Blender's multilayer files have it; the one layer that
-/// has `R`, `G` and `B`; a lone luminance `Y`. Of several resolution levels the
+/// has `R`, `G` and `B`; `X`, `Y`, `Z`; a lone luminance `Y`; a lone channel of
+/// any name. Of several resolution levels the
 /// largest is taken. Alpha stays a channel of a layer and has no influence.
 ///
 /// # Errors
 /// When the file can't be read or has no such channels.
 pub fn read_exr(path: &Path) -> Result<Image, ExrError> {
-    let bytes = std::fs::read(path).map_err(|source| ExrError::Io {
+    let fail = |source| ExrError::Io {
         path: path.to_owned(),
         source,
-    })?;
+    };
+    let mut bytes = Vec::new();
+    let mut file = crate::file::open(path).map_err(fail)?;
+    file.read_to_end(&mut bytes).map_err(fail)?;
     decode(&bytes, path)
 }
 
@@ -70,26 +76,21 @@ fn decode(bytes: &[u8], path: &Path) -> Result<Image, ExrError> {
         path: path.to_owned(),
         reason,
     };
-    let file: FlatImage = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| format(error.to_string()))?;
+    let most = Budget::of_machine().left();
+    let file = read_flat(Cursor::new(bytes), bytes.len() as u64, most).map_err(format)?;
 
     let planes = Plane::all(&file);
-    let colors = find_color(&planes).map_err(|problem| ExrError::NoColor {
+    let chosen = find_color(&planes).map_err(|problem| ExrError::NoColor {
         path: path.to_owned(),
         problem,
         found: planes.iter().map(Plane::full_name).collect(),
     })?;
+    let colors = chosen.color;
     let data_window = planes[colors[0]].window;
     let (resolution, window) = place(file.attributes.display_window, data_window);
     let values = |index: usize| {
         let plane: &Plane = &planes[index];
-        if plane.samples.len() != window.area() || plane.window != data_window {
+        if !plane.is_whole() || plane.window != data_window {
             let name = plane.full_name();
             let problem = format!("channel {name} is subsampled or of another size");
             return Err(format(problem));
@@ -120,79 +121,6 @@ fn decode(bytes: &[u8], path: &Path) -> Result<Image, ExrError> {
     }
     image.attributes = attributes(&file);
     Ok(image)
-}
-
-/// A channel of a file, with its name split at the last dot.
-struct Plane<'a> {
-    layer: String,
-    channel: String,
-    window: IntegerBounds,
-    samples: &'a FlatSamples,
-}
-
-impl<'a> Plane<'a> {
-    fn all(file: &'a FlatImage) -> Vec<Self> {
-        let mut planes = Vec::new();
-        for part in &file.layer_data {
-            let part_name = part.attributes.layer_name.as_ref().map(text);
-            for channel in &part.channel_data.list {
-                let name = text(&channel.name);
-                let (layer, channel_name) = name.rsplit_once('.').unwrap_or(("", &name));
-                // In a file of several parts, a layer may be named by its part.
-                let layer = match &part_name {
-                    Some(part) if layer.is_empty() && file.layer_data.len() > 1 => part,
-                    _ => layer,
-                };
-                planes.push(Self {
-                    layer: layer.to_owned(),
-                    channel: channel_name.to_owned(),
-                    window: part.absolute_bounds(),
-                    samples: &channel.sample_data,
-                });
-            }
-        }
-        planes
-    }
-
-    fn full_name(&self) -> String {
-        join(&self.layer, &self.channel)
-    }
-}
-
-fn join(layer: &str, channel: &str) -> String {
-    if layer.is_empty() {
-        channel.to_owned()
-    } else {
-        format!("{layer}.{channel}")
-    }
-}
-
-/// The indices of red, green and blue, or what is wrong.
-fn find_color(planes: &[Plane]) -> Result<[usize; 3], &'static str> {
-    let find = |layer: &str, channel: &str| {
-        let matches = |plane: &Plane| plane.layer == layer && plane.channel == channel;
-        planes.iter().position(matches)
-    };
-    let rgb = |layer: &str| Some([find(layer, "R")?, find(layer, "G")?, find(layer, "B")?]);
-    if let Some(color) = rgb("") {
-        return Ok(color);
-    }
-    let mut layers: Vec<&str> = planes.iter().map(|plane| plane.layer.as_str()).collect();
-    layers.sort_unstable();
-    layers.dedup();
-    layers.retain(|layer| rgb(layer).is_some());
-    let combined = |layer: &&str| layer.rsplit('.').next() == Some("Combined");
-    if layers.iter().copied().any(|layer| combined(&layer)) {
-        layers.retain(combined);
-    }
-    match layers.as_slice() {
-        [layer] => Ok(rgb(layer).expect("layers without colour were dropped")),
-        [] => {
-            let grey = find("", "Y").ok_or("but no layer has R, G and B")?;
-            Ok([grey; 3])
-        }
-        _ => Err("but more than one layer could be meant"),
-    }
 }
 
 /// The size of the full image and the part of it that the file's data covers.
@@ -279,11 +207,6 @@ pub(super) fn encode(image: &Image, file: impl Write + Seek) -> Result<(), exr::
     }
     .write()
     .to_buffered(file)
-}
-
-/// The format's strings are bytes; we take and write UTF-8, as Blender does.
-fn text(text: &Text) -> String {
-    String::from_utf8_lossy(text.as_slice()).into_owned()
 }
 
 fn exr_text(text: &str) -> Text {

@@ -4,6 +4,7 @@
 
 mod exr;
 mod output;
+pub(crate) mod planes;
 mod window;
 
 pub use exr::{ExrError, read_exr};

@@ -1,5 +1,6 @@
 //! From what the parser gives to one sound mesh.
 
+use super::polygons::Triangulation;
 use super::{LineProblem, Mesh, Repair, Wanted};
 use glam::DVec3;
 
@@ -25,7 +26,10 @@ pub(super) fn assemble(
         .sum();
     let triangles: usize = models
         .iter()
-        .map(|model| model.mesh.indices.len() / 3)
+        .map(|model| match model.mesh.face_arities.len() {
+            0 => model.mesh.indices.len() / 3,
+            faces => model.mesh.indices.len() - 2 * faces,
+        })
         .sum();
     if triangles == 0 {
         return Err(whole("the mesh has no faces".to_owned()));
@@ -38,8 +42,9 @@ pub(super) fn assemble(
     let has_nameless = models
         .iter()
         .any(|model| model.mesh.material_id.is_none() && !model.mesh.indices.is_empty());
-    let nameless = names.len();
-    if has_nameless && !names.is_empty() {
+    let nameless = names.iter().position(String::is_empty);
+    let nameless = nameless.unwrap_or(names.len());
+    if has_nameless && nameless == names.len() && nameless > 0 {
         names.push(String::new());
     }
     if names.len() > usize::from(u16::MAX) {
@@ -62,16 +67,21 @@ pub(super) fn assemble(
     };
     let mut incomplete = 0;
     let mut uvs_replaced = 0;
+    let mut triangulation = Triangulation::default();
     for tobj::Model { mesh: part, .. } in models {
         let base = mesh.positions.len() as u32;
         let count = part.positions.len() / 3;
         mesh.positions
             .extend(part.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
-        mesh.triangles.extend(
-            part.indices
-                .chunks_exact(3)
-                .map(|t| [base + t[0], base + t[1], base + t[2]]),
-        );
+        let too_far = |position: &&[f32; 3]| !position.iter().all(|x| x.abs() <= FARTHEST);
+        if let Some(position) = mesh.positions[base as usize..].iter().find(too_far) {
+            return Err(whole(format!(
+                "expected coordinates up to {FARTHEST:e} m, found {position:?}"
+            )));
+        }
+        let first_triangle = mesh.triangles.len();
+        triangulation.add(&mut mesh, base, &part.indices, &part.face_arities);
+        let added = mesh.triangles.len() - first_triangle;
         if let Some(normals) = &mut mesh.normals {
             // With a normal at some corners alone, which ones is lost.
             let complete = part.normals.len() == 3 * count;
@@ -79,7 +89,7 @@ pub(super) fn assemble(
                 normals.extend(part.normals.chunks_exact(3).map(|n| [n[0], n[1], n[2]]));
             } else {
                 if !part.normals.is_empty() {
-                    incomplete += part.indices.len() / 3;
+                    incomplete += added;
                 }
                 normals.resize(normals.len() + count, [0.0; 3]);
             }
@@ -93,17 +103,8 @@ pub(super) fn assemble(
         }
         if let Some(materials) = &mut mesh.material_of_triangle {
             let id = part.material_id.unwrap_or(nameless) as u16;
-            materials.resize(materials.len() + part.indices.len() / 3, id);
+            materials.resize(materials.len() + added, id);
         }
-    }
-    if let Some(position) = mesh
-        .positions
-        .iter()
-        .find(|p| !p.iter().all(|x| x.abs() <= FARTHEST))
-    {
-        return Err(whole(format!(
-            "expected coordinates up to {FARTHEST:e} m, found {position:?}"
-        )));
     }
     for uv in mesh
         .uvs
@@ -124,9 +125,10 @@ pub(super) fn assemble(
 
     let counted = [
         (
-            dropped,
-            Repair::DegenerateTrianglesDropped as fn(usize) -> Repair,
+            triangulation.crossing,
+            Repair::PolygonsCrossing as fn(usize) -> Repair,
         ),
+        (dropped, Repair::DegenerateTrianglesDropped),
         (incomplete, Repair::NormalsIncomplete),
         (replaced, Repair::NormalsReplaced),
         (uvs_replaced, Repair::UvsReplaced),

@@ -2,6 +2,8 @@
 
 use super::feed::{BLOCK, Block};
 use super::{LineProblem, Repair, Wanted};
+use crate::text::{excerpt, excerpt_of_bytes};
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -15,6 +17,59 @@ const MAX_FACES: usize = 1 << 15;
 
 /// More than this bury the cause.
 const MAX_PROBLEMS: usize = 20;
+
+/// In bytes: room for a face of a million corners.
+const MAX_LINE: usize = 1 << 26;
+
+/// The parser's name for the material of faces that have none: it takes no
+/// empty one, and no line of a file can hold this one.
+const NAMELESS: &str = "\0";
+
+/// How files begin that are taken for OBJ files by mistake, and what they are.
+const OTHER_FORMATS: [(&[u8], &str); 12] = [
+    (b"\xff\xfe", "text in UTF-16"),
+    (b"\xfe\xff", "text in UTF-16"),
+    (b"\x1f\x8b", "a gzip file"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard file"),
+    (b"PK\x03\x04", "a ZIP file"),
+    (b"BLENDER", "a Blender file"),
+    (b"Kaydara FBX", "an FBX file"),
+    (b"glTF", "a glTF file"),
+    (b"ply", "a PLY file"),
+    (b"solid", "an STL file"),
+    (b"#usda", "a USD file"),
+    (b"<", "an XML file"),
+];
+
+/// What lines begin with that say nothing about triangles.
+const OF_NO_USE: [&[u8]; 26] = [
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"shadow_obj",
+    b"trace_obj",
+    b"vp",
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"ctech",
+    b"stech",
+    b"res",
+];
 
 /// Gives the lines of a file that describe triangles in blocks, without what is
 /// not wanted; lines that make no sense are reported and left out.
@@ -34,12 +89,20 @@ pub(super) struct Lines<R> {
     ahead: Vec<(usize, usize, u64)>,
     /// The farthest index so far, of each kind, that had yet to come.
     farthest: [u64; 3],
+    /// How many corners name each kind.
+    named: [usize; 3],
+    /// For each kind, the first corner that counts back from where none came yet.
+    back_from_none: [Option<LineProblem>; 3],
     /// Faces of the object so far.
     faces: usize,
     names: Vec<String>,
     known_names: HashSet<String>,
     polygons: usize,
     points_and_lines: usize,
+    /// Lines that begin with no known word, and the number of the first.
+    unknown: (usize, usize),
+    /// Nothing more is read.
+    ended: bool,
     problems: Vec<LineProblem>,
 }
 
@@ -62,6 +125,17 @@ pub(super) fn material_of_its_own(name: &Path) -> tobj::MTLLoadResult {
 /// Models, the names that their material ids index, and repairs.
 type Parts = (Vec<tobj::Model>, Vec<String>, Vec<Repair>);
 
+/// Why lines make no mesh.
+pub(super) enum Refusal {
+    Problems(Vec<LineProblem>),
+    /// Faces name what the file has none of; it can be read without.
+    Absent {
+        /// What the file has.
+        present: Wanted,
+        repairs: Vec<Repair>,
+    },
+}
+
 impl<R: BufRead> Lines<R> {
     pub fn new(inner: R, wanted: Wanted) -> Self {
         Self {
@@ -74,11 +148,15 @@ impl<R: BufRead> Lines<R> {
             counts: [0; 3],
             ahead: Vec::new(),
             farthest: [0; 3],
+            named: [0; 3],
+            back_from_none: [const { None }; 3],
             faces: 0,
             names: Vec::new(),
             known_names: HashSet::new(),
             polygons: 0,
             points_and_lines: 0,
+            unknown: (0, 0),
+            ended: false,
             problems: Vec::new(),
         }
     }
@@ -88,10 +166,34 @@ impl<R: BufRead> Lines<R> {
         mut self,
         loaded: tobj::LoadResult,
         last: (usize, String),
-    ) -> Result<Parts, Vec<LineProblem>> {
+    ) -> Result<Parts, Refusal> {
+        let absent =
+            |kind: usize, wanted: bool| wanted && self.counts[kind] == 0 && self.named[kind] > 0;
+        let Wanted { uvs, normals } = self.wanted;
+        let (no_uvs, no_normals) = (absent(1, uvs), absent(2, normals));
+        if (no_uvs || no_normals) && !self.ended {
+            let present = Wanted {
+                uvs: uvs && !no_uvs,
+                normals: normals && !no_normals,
+            };
+            let mut repairs = Vec::new();
+            if no_uvs {
+                repairs.push(Repair::UvsAbsent(self.named[1]));
+            }
+            if no_normals {
+                repairs.push(Repair::NormalsAbsent(self.named[2]));
+            }
+            return Err(Refusal::Absent { present, repairs });
+        }
+        for (kind, problem) in self.back_from_none.iter_mut().enumerate() {
+            if self.counts[kind] > 0 {
+                self.problems.extend(problem.take());
+            }
+        }
         for &(line, kind, index) in &self.ahead {
             let count = self.counts[kind];
-            if index > count {
+            // Those of a kind that the file has none of are not looked at.
+            if index > count && (count > 0 || kind == 0) {
                 let message = format!("there is no {} {index}, only {count}", KINDS[kind]);
                 self.problems.push(LineProblem {
                     line: Some(line),
@@ -111,16 +213,19 @@ impl<R: BufRead> Lines<R> {
                 if self.points_and_lines > 0 {
                     repairs.push(Repair::PointsAndLinesIgnored(self.points_and_lines));
                 }
+                if let (count @ 1.., first) = self.unknown {
+                    repairs.push(Repair::UnknownLinesIgnored { count, first });
+                }
                 Ok((models, self.names, repairs))
             }
             Err(error) if self.problems.is_empty() => {
                 let (line, text) = last;
-                Err(vec![LineProblem {
+                Err(Refusal::Problems(vec![LineProblem {
                     line: Some(line),
-                    message: format!("{error} in `{text}`"),
-                }])
+                    message: format!("{error} in `{}`", excerpt(&text)),
+                }]))
             }
-            _ => Err(self.problems),
+            _ => Err(Refusal::Problems(self.problems)),
         }
     }
 
@@ -149,10 +254,17 @@ impl<R: BufRead> Lines<R> {
                 }
             }
             self.start = self.block.text.len();
-            match std::str::from_utf8(&raw) {
-                Ok(line) => self.line(line),
-                Err(_) => self.problem("expected UTF-8, found other bytes".to_owned()),
+            if self.number == 1 {
+                self.judge_beginning(&raw);
             }
+            if raw.contains(&0) && !self.ended {
+                self.problem("expected text, found a byte of value 0".to_owned());
+                self.ended = true;
+            }
+            if self.ended {
+                break;
+            }
+            self.line(&raw);
             if self.block.text.len() > self.start {
                 let end = self.block.text.len();
                 self.block.origins.push((end, self.number));
@@ -163,16 +275,30 @@ impl<R: BufRead> Lines<R> {
         (!block.text.is_empty()).then_some(block)
     }
 
-    /// Reads one line, with those that it continues on.
+    /// Files of other formats would give as many problems as they have lines.
+    fn judge_beginning(&mut self, line: &[u8]) {
+        let found = OTHER_FORMATS
+            .iter()
+            .find(|(beginning, _)| line.starts_with(beginning));
+        if let Some((_, format)) = found {
+            self.problem(format!("expected a Wavefront OBJ file, found {format}"));
+            self.ended = true;
+        }
+    }
+
+    /// Reads one line, with those that it continues on. Lines end as on Unix,
+    /// Windows or old Macs.
     fn read_line(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
         raw.clear();
         loop {
-            if self.inner.read_until(b'\n', raw)? == 0 {
+            let before = raw.len();
+            if !self.read_to_line_end(raw)? {
                 return Ok(!raw.is_empty());
             }
             self.number += 1;
             let end = raw.trim_ascii_end().len();
-            if end == 0 || raw[end - 1] != b'\\' {
+            let comment = raw.trim_ascii_start().first() == Some(&b'#');
+            if end <= before || raw[end - 1] != b'\\' || comment {
                 return Ok(true);
             }
             raw.truncate(end - 1);
@@ -180,30 +306,74 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    fn line(&mut self, line: &str) {
-        let line = line.strip_prefix('\u{feff}').unwrap_or(line).trim_ascii();
-        let end = line.bytes().position(|byte| byte.is_ascii_whitespace());
+    /// Appends what is left of a line; false at the end of the file.
+    fn read_to_line_end(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
+        let mut found = false;
+        loop {
+            let available = match self.inner.fill_buf() {
+                Ok(available) => available,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            if available.is_empty() {
+                return Ok(found);
+            }
+            found = true;
+            let end = memchr::memchr2(b'\n', b'\r', available);
+            raw.extend_from_slice(&available[..end.unwrap_or(available.len())]);
+            if raw.len() > MAX_LINE {
+                let message = format!("a line is longer than {MAX_LINE} bytes");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+            }
+            let Some(end) = end else {
+                let all = available.len();
+                self.inner.consume(all);
+                continue;
+            };
+            let carriage_return = available[end] == b'\r';
+            self.inner.consume(end + 1);
+            if carriage_return && self.inner.fill_buf()?.first() == Some(&b'\n') {
+                self.inner.consume(1);
+            }
+            return Ok(true);
+        }
+    }
+
+    fn line(&mut self, line: &[u8]) {
+        let line = line
+            .strip_prefix("\u{feff}".as_bytes())
+            .unwrap_or(line)
+            .trim_ascii();
+        let end = line.iter().position(|byte| byte.is_ascii_whitespace());
         let (keyword, rest) = line.split_at(end.unwrap_or(line.len()));
-        let values = rest.split('#').next().unwrap_or_default();
         match keyword {
-            "v" => {
-                let count = values.split_ascii_whitespace().count();
-                // Six are a position and a colour, which nobody looks at.
-                let kept = if count == 4 { 4 } else { 3 };
-                self.numbers(keyword, values, kept, 0);
+            b"v" => self.numbers("v", rest, [3, 3], 0),
+            b"vt" if self.wanted.uvs => self.numbers("vt", rest, [1, 2], 1),
+            b"vn" if self.wanted.normals => self.numbers("vn", rest, [3, 3], 2),
+            b"vt" => self.counts[1] += 1,
+            b"vn" => self.counts[2] += 1,
+            // `fo` is how old files begin faces.
+            b"f" | b"fo" => self.face(rest),
+            b"l" | b"p" | b"curv" | b"curv2" | b"surf" | b"bsp" | b"bzp" | b"cdc" | b"cdp" => {
+                self.points_and_lines += 1;
             }
-            "vt" if self.wanted.uvs => self.numbers(keyword, values, 2, 1),
-            "vn" if self.wanted.normals => self.numbers(keyword, values, 3, 2),
-            "vt" => self.counts[1] += 1,
-            "vn" => self.counts[2] += 1,
-            "f" => self.face(values),
-            "l" | "p" => self.points_and_lines += 1,
-            "o" | "g" => {
+            b"o" | b"g" => {
                 self.faces = 0;
-                self.hand_on(format_args!("{line}"));
+                self.hand_on(format_args!("o"));
             }
-            "usemtl" => self.material(rest.trim()),
-            _ => {}
+            b"usemtl" => self.material(rest.trim_ascii()),
+            b"call" | b"csh" => {
+                let word = excerpt_of_bytes(keyword);
+                self.problem(format!("`{word}` takes in another file, which is not read"));
+            }
+            b"" => {}
+            _ if keyword[0] == b'#' || OF_NO_USE.contains(&keyword) => {}
+            _ => {
+                self.unknown.0 += 1;
+                if self.unknown.0 == 1 {
+                    self.unknown.1 = self.number;
+                }
+            }
         }
     }
 
@@ -211,36 +381,45 @@ impl<R: BufRead> Lines<R> {
         writeln!(self.block.text, "{line}").expect("writing to memory does not fail");
     }
 
-    fn numbers(&mut self, keyword: &str, values: &str, wanted: usize, kind: usize) {
+    /// Hands on a vertex, texture coordinate or normal of `least` numbers or
+    /// more, of which `most` count.
+    fn numbers(&mut self, keyword: &str, values: &[u8], [least, most]: [usize; 2], kind: usize) {
         self.counts[kind] += 1;
         self.block.text.extend_from_slice(keyword.as_bytes());
-        // Only letters make numbers that are none, and texts this long ones out of range.
-        let plain = values.len() < 60 && !values.bytes().any(|byte| byte.is_ascii_alphabetic());
+        // Only digits, in texts this short, make numbers that are sound.
+        let plain = values.len() < 60
+            && values
+                .iter()
+                .all(|byte| byte.is_ascii_digit() || b" \t.-+".contains(byte));
+        let mut words = [&b""[..]; 4];
         let mut found = 0;
-        for word in values.split_ascii_whitespace().take(wanted) {
-            let number = if plain {
-                Some(0.0)
-            } else {
-                word.parse::<f32>().ok()
-            };
-            match number {
-                // Broken normals and texture coordinates can be replaced.
-                Some(number) if !number.is_finite() && kind == 0 => {
-                    self.problem(format!("expected finite coordinates, found `{word}`"));
-                }
-                Some(_) => {}
-                None => self.problem(format!("expected a number, found `{word}`")),
+        for word in Words(values) {
+            if found < 4 {
+                words[found] = word;
             }
-            self.block.text.push(b' ');
-            self.block.text.extend_from_slice(word.as_bytes());
             found += 1;
         }
-        self.block.text.push(b'\n');
-        if found < wanted {
+        // A fourth number alone is a weight; six are a position and a colour,
+        // which nobody looks at.
+        let kept = if kind == 0 && found == 4 { 4 } else { most };
+        for word in &words[..found.min(kept)] {
+            let word = if plain {
+                Cow::Borrowed(*word)
+            } else {
+                self.number(word, kind)
+            };
+            self.block.text.push(b' ');
+            self.block.text.extend_from_slice(&word);
+        }
+        if found < least {
             self.problem(format!(
-                "expected {wanted} numbers after `{keyword}`, found {found}"
+                "expected {least} numbers after `{keyword}`, found {found}"
             ));
         }
+        for _ in found..most {
+            self.block.text.extend_from_slice(b" 0");
+        }
+        self.block.text.push(b'\n');
         if self
             .problems
             .last()
@@ -252,10 +431,32 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    fn face(&mut self, values: &str) {
+    /// A number as the parser reads it; what is none is reported.
+    fn number<'a>(&mut self, word: &'a [u8], kind: usize) -> Cow<'a, [u8]> {
+        let parsed = std::str::from_utf8(word)
+            .ok()
+            .and_then(|word| word.parse::<f32>().ok());
+        let number = parsed.or_else(|| is_no_number(word).then_some(f32::NAN));
+        match number {
+            // Broken normals and texture coordinates can be replaced.
+            Some(number) if !number.is_finite() && kind == 0 => {
+                let word = excerpt_of_bytes(word);
+                self.problem(format!("expected finite coordinates, found `{word}`"));
+            }
+            Some(number) if !number.is_finite() => return Cow::Borrowed(b"nan"),
+            Some(_) => {}
+            None => {
+                let word = excerpt_of_bytes(word);
+                self.problem(format!("expected a number, found `{word}`"));
+            }
+        }
+        Cow::Borrowed(word)
+    }
+
+    fn face(&mut self, values: &[u8]) {
         self.block.text.extend_from_slice(b"f");
         let mut corners = 0;
-        for corner in values.split_ascii_whitespace() {
+        for corner in Words(values) {
             corners += 1;
             if let Err(message) = self.corner(corner) {
                 self.problem(message);
@@ -284,22 +485,23 @@ impl<R: BufRead> Lines<R> {
     }
 
     /// Hands on a corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1.
-    fn corner(&mut self, corner: &str) -> Result<(), String> {
+    fn corner(&mut self, corner: &[u8]) -> Result<(), String> {
         let mut indices = [0; 3];
-        let mut parts = corner.split('/');
+        let mut parts = corner.split(|&byte| byte == b'/');
         for (kind, slot) in indices.iter_mut().enumerate() {
             *slot = match parts.next() {
-                None | Some("") if kind > 0 => continue,
+                None | Some(b"") if kind > 0 => continue,
                 Some(part) => self.index(part, kind)?,
                 None => continue,
             };
         }
         if parts.next().is_some() {
+            let corner = excerpt_of_bytes(corner);
             return Err(format!("expected a corner like 1/2/3, found `{corner}`"));
         }
         self.block.text.push(b' ');
-        if self.wanted == Wanted::ALL && !corner.contains('-') {
-            self.block.text.extend_from_slice(corner.as_bytes());
+        if self.wanted == Wanted::ALL && !corner.contains(&b'-') {
+            self.block.text.extend_from_slice(corner);
             return Ok(());
         }
         let vt = indices[1] * u64::from(self.wanted.uvs);
@@ -319,16 +521,29 @@ impl<R: BufRead> Lines<R> {
     }
 
     /// An index counted from 1, whichever way it was counted.
-    fn index(&mut self, text: &str, kind: usize) -> Result<u64, String> {
+    fn index(&mut self, text: &[u8], kind: usize) -> Result<u64, String> {
         let count = self.counts[kind];
-        let given: i64 = text
-            .parse()
-            .map_err(|_| format!("expected the index of a {}, found `{text}`", KINDS[kind]))?;
+        let given = std::str::from_utf8(text).ok();
+        let given = given.and_then(|text| text.parse::<i64>().ok());
+        let given = given.ok_or_else(|| {
+            let text = excerpt_of_bytes(text);
+            format!("expected the index of a {}, found `{text}`", KINDS[kind])
+        })?;
+        self.named[kind] += 1;
         let index = match u64::try_from(given) {
             Ok(0) => return Err(format!("indices start at 1, found a {} 0", KINDS[kind])),
             Ok(index) => index,
+            Err(_) if count == 0 && kind > 0 => {
+                // A mistake only if the file has any further on.
+                let message = format!("there is no {} {given}: none came before", KINDS[kind]);
+                self.back_from_none[kind].get_or_insert(LineProblem {
+                    line: Some(self.number),
+                    message,
+                });
+                return Ok(0);
+            }
             Err(_) => count
-                .checked_add_signed(given + 1)
+                .checked_add_signed(given.saturating_add(1))
                 .filter(|&index| index > 0)
                 .ok_or_else(|| {
                     format!(
@@ -354,17 +569,76 @@ impl<R: BufRead> Lines<R> {
         Ok(index)
     }
 
-    fn material(&mut self, name: &str) {
-        if name.is_empty() {
-            self.problem("expected a name after `usemtl`, found nothing".to_owned());
-            return;
-        }
+    fn material(&mut self, name: &[u8]) {
+        let name = match std::str::from_utf8(name) {
+            // Blender's for faces of an empty slot.
+            Ok("") => {
+                self.hand_on_material(NAMELESS, "");
+                return;
+            }
+            Ok(name) => Cow::Borrowed(name),
+            // Other encodings can't be told apart; in this one, other bytes are
+            // another name.
+            Err(_) => name.iter().map(|&byte| char::from(byte)).collect(),
+        };
+        self.hand_on_material(&name, &name);
+    }
+
+    fn hand_on_material(&mut self, handed_on: &str, name: &str) {
         if self.known_names.insert(name.to_owned()) {
             self.names.push(name.to_owned());
-            self.hand_on(format_args!("mtllib {name}"));
+            self.hand_on(format_args!("mtllib {handed_on}"));
         }
-        self.hand_on(format_args!("usemtl {name}"));
+        self.hand_on(format_args!("usemtl {handed_on}"));
     }
+}
+
+/// The words of a line up to a comment. MSVC writes numbers that are none with
+/// a `#` inside.
+struct Words<'a>(&'a [u8]);
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let text = self.0.trim_ascii_start();
+        let end = text
+            .iter()
+            .position(|byte| byte.is_ascii_whitespace() || *byte == b'#');
+        let mut end = end.unwrap_or(text.len());
+        let mut rest = &text[end..];
+        if rest.first() == Some(&b'#') {
+            let word_end = text.iter().position(u8::is_ascii_whitespace);
+            let word_end = word_end.unwrap_or(text.len());
+            if is_no_number(&text[..word_end]) {
+                end = word_end;
+                rest = &text[end..];
+            } else {
+                rest = b"";
+            }
+        }
+        self.0 = rest;
+        (end > 0).then(|| &text[..end])
+    }
+}
+
+/// Whether this is how a C library writes infinity or a NaN: `-1.#IND`,
+/// `1.#INF00`, `1.#QNAN`, `1.#J` (rounded to two digits), `-nan(ind)`.
+fn is_no_number(word: &[u8]) -> bool {
+    let word = word
+        .strip_prefix(b"-")
+        .or(word.strip_prefix(b"+"))
+        .unwrap_or(word);
+    let starts = |beginnings: &[&[u8]]| {
+        let begins = |beginning: &&[u8]| {
+            word.get(..beginning.len())
+                .is_some_and(|start| start.eq_ignore_ascii_case(beginning))
+        };
+        beginnings.iter().any(begins)
+    };
+    starts(&[
+        b"1.#inf", b"1.#ind", b"1.#qnan", b"1.#snan", b"1.#j", b"1.#r", b"nan(", b"nan:",
+    ])
 }
 
 /// A hot path: three million per million triangles.

@@ -7,10 +7,11 @@
 mod assemble;
 mod feed;
 mod lines;
+mod polygons;
 
+use lines::Refusal;
 use std::fmt;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
 /// Triangles with one index per corner for all that a vertex has.
@@ -53,9 +54,12 @@ impl Wanted {
 /// What was amiss with a mesh and how it was made good.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Repair {
-    /// So many faces of more than four corners were cut into fans.
+    /// So many faces of more than four corners were cut into triangles.
     PolygonsTriangulated(usize),
-    /// So many points and lines were left out.
+    /// So many polygons cross themselves or are far from plane, so that what
+    /// they cover is a guess.
+    PolygonsCrossing(usize),
+    /// So many points, lines and curves were left out.
     PointsAndLinesIgnored(usize),
     /// So many triangles without an area were left out.
     DegenerateTrianglesDropped(usize),
@@ -68,15 +72,30 @@ pub enum Repair {
     /// So many vertices had no texture coordinates, or infinite ones or NaN,
     /// and got (0, 0).
     UvsReplaced(usize),
+    /// So many corners name texture coordinates in a file that has none.
+    UvsAbsent(usize),
+    /// So many corners name normals in a file that has none.
+    NormalsAbsent(usize),
+    /// Lines that begin with no word of the format were left out.
+    UnknownLinesIgnored {
+        /// How many.
+        count: usize,
+        /// The line of the first, from 1.
+        first: usize,
+    },
 }
 
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::PolygonsTriangulated(n) => {
-                write!(f, "{n} faces of more than four corners cut into fans")
+                write!(f, "{n} faces of more than four corners cut into triangles")
             }
-            Self::PointsAndLinesIgnored(n) => write!(f, "{n} points and lines left out"),
+            Self::PolygonsCrossing(n) => write!(
+                f,
+                "{n} polygons that cross themselves or are not plane may be cut wrongly"
+            ),
+            Self::PointsAndLinesIgnored(n) => write!(f, "{n} points, lines and curves left out"),
             Self::DegenerateTrianglesDropped(n) => write!(f, "{n} triangles without area left out"),
             Self::NormalsReplaced(n) => write!(
                 f,
@@ -88,6 +107,18 @@ impl fmt::Display for Repair {
             Self::UvsReplaced(n) => write!(
                 f,
                 "{n} vertices without usable texture coordinates given (0, 0)"
+            ),
+            Self::UvsAbsent(n) => write!(
+                f,
+                "{n} corners name texture coordinates, of which the file has none: read without"
+            ),
+            Self::NormalsAbsent(n) => write!(
+                f,
+                "{n} corners name normals, of which the file has none: shaded flat"
+            ),
+            Self::UnknownLinesIgnored { count, first } => write!(
+                f,
+                "{count} lines that begin with no known word left out, the first in line {first}"
             ),
         }
     }
@@ -112,6 +143,15 @@ pub struct LineProblem {
     pub message: String,
 }
 
+impl LineProblem {
+    fn of_file(error: &std::io::Error) -> Self {
+        Self {
+            line: None,
+            message: format!("the mesh can't be read: {error}"),
+        }
+    }
+}
+
 impl fmt::Display for LineProblem {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.line {
@@ -130,7 +170,7 @@ impl Mesh {
     /// no sense.
     pub fn load(path: &Path, wanted: Wanted) -> Result<(Self, Vec<Repair>), MeshError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|error| MeshError {
+        let file = crate::file::open(path).map_err(|error| MeshError {
             source_name: name.clone(),
             problems: vec![LineProblem {
                 line: None,
@@ -145,24 +185,39 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::load`]; `source_name` stands for the file's name.
     pub fn read(
-        reader: impl BufRead + Send,
+        mut reader: impl BufRead + Seek + Send,
         source_name: &str,
         wanted: Wanted,
     ) -> Result<(Self, Vec<Repair>), MeshError> {
-        let mut lines = lines::Lines::new(reader, wanted);
-        let options = tobj::LoadOptions {
-            triangulate: true,
-            single_index: true,
-            ..Default::default()
+        let result = match read_once(&mut reader, wanted) {
+            // That there is none shows at the end, when faces have been read with them.
+            Err(Refusal::Absent { present, repairs }) => reader
+                .rewind()
+                .map_err(|error| Refusal::Problems(vec![LineProblem::of_file(&error)]))
+                .and_then(|()| read_once(&mut reader, present))
+                .map(|(mesh, others)| (mesh, [repairs, others].concat())),
+            result => result,
         };
-        let (loaded, last) = feed::parse(&mut lines, &options);
-        let result = match lines.finish(loaded, last) {
-            Ok((models, names, repairs)) => assemble::assemble(models, names, repairs, wanted),
-            Err(problems) => Err(problems),
-        };
-        result.map_err(|problems| MeshError {
+        result.map_err(|refusal| MeshError {
             source_name: source_name.to_owned(),
-            problems,
+            problems: match refusal {
+                Refusal::Problems(problems) => problems,
+                Refusal::Absent { .. } => unreachable!("the second time it is not wanted"),
+            },
         })
     }
+}
+
+fn read_once(
+    reader: &mut (impl BufRead + Send),
+    wanted: Wanted,
+) -> Result<(Mesh, Vec<Repair>), Refusal> {
+    let mut lines = lines::Lines::new(reader, wanted);
+    let options = tobj::LoadOptions {
+        single_index: true,
+        ..Default::default()
+    };
+    let (loaded, last) = feed::parse(&mut lines, &options);
+    let (models, names, repairs) = lines.finish(loaded, last)?;
+    assemble::assemble(models, names, repairs, wanted).map_err(Refusal::Problems)
 }

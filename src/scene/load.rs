@@ -9,8 +9,9 @@ use crate::description::{
     Assignment, Color, Description, Material, MaterialRef, Object, Reflectance, Rough, Roughness,
     Scalar, Tangent, World,
 };
+use crate::memory::Budget;
 use crate::mesh::{Mesh, Wanted};
-use crate::texture::{EnvironmentImage, Texture, load_environment};
+use crate::texture::{EnvironmentImage, Images, Texture, load_environment};
 
 /// The contents of a scene's files.
 #[derive(Debug, Default)]
@@ -30,8 +31,8 @@ impl Assets {
     /// Reads what the description's objects and world need, and nothing else.
     ///
     /// # Errors
-    /// Everything that could not be read.
-    pub fn load(description: &Description) -> Result<Self, ResolveError> {
+    /// Everything that could not be read, or for which the budget has no room.
+    pub fn load(description: &Description, budget: &Budget) -> Result<Self, ResolveError> {
         let used = Used::by(description);
         let meshes: Vec<_> = used
             .meshes
@@ -48,13 +49,14 @@ impl Assets {
                 ))
             })
             .collect();
+        let images = Images::new(budget);
         let textures: Vec<_> = used
             .textures
             .par_iter()
             .filter_map(|name| {
                 let texture = description.textures.get(name)?;
                 let path = description.resolve_path(&texture.file);
-                let loaded = Texture::load(
+                let loaded = images.texture(
                     &path,
                     texture.color_space,
                     texture.interpolation,
@@ -66,7 +68,8 @@ impl Assets {
             .collect();
         let environment = match &description.world {
             Some(World::Environment { file, .. }) => {
-                Some(load_environment(&description.resolve_path(file)).map_err(|e| e.to_string()))
+                let loaded = load_environment(&description.resolve_path(file), budget);
+                Some(loaded.map_err(|e| e.to_string()))
             }
             _ => None,
         };
@@ -105,6 +108,8 @@ impl Assets {
             Some(Err(error)) => errors.push(error),
             None => {}
         }
+        // Of an image that several textures share, once.
+        errors.dedup();
         if errors.is_empty() {
             Ok(assets)
         } else {

@@ -15,7 +15,7 @@ pub use material::{
     WeightedLeaf, blender_alphas,
 };
 pub use materials::{MaterialError, Names, compile_material};
-pub use resolve::{ResolveError, Resolved, assemble, resolve};
+pub use resolve::{ResolveError, Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
 pub use surface::{Surface, View};
 pub use transform::{euler, to_affine};

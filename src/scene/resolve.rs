@@ -15,6 +15,7 @@ use crate::description::{Assignment, Description, Transform};
 use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
 use crate::features::Features;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
+use crate::memory::Budget;
 use crate::mesh::Mesh;
 use crate::scene::material::{Distribution, Facet, Tint};
 use crate::texture::Texture;
@@ -50,14 +51,29 @@ pub struct Resolved {
 /// # Errors
 /// Every file that can't be read and every name that leads nowhere.
 pub fn resolve(description: &Description) -> Result<Resolved, ResolveError> {
-    assemble(description, Assets::load(description)?)
+    resolve_within(description, &Budget::of_machine())
+}
+
+/// As [`resolve`], with no more memory than `budget` has.
+///
+/// # Errors
+/// As [`resolve`], and what there is no room for.
+pub fn resolve_within(
+    description: &Description,
+    budget: &Budget,
+) -> Result<Resolved, ResolveError> {
+    assemble(description, Assets::load(description, budget)?, budget)
 }
 
 /// Builds the scene from a description and the contents of its files.
 ///
 /// # Errors
 /// Every name that leads nowhere, and what Embree refuses.
-pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, ResolveError> {
+pub fn assemble(
+    description: &Description,
+    assets: Assets,
+    budget: &Budget,
+) -> Result<Resolved, ResolveError> {
     let mut problems = Vec::new();
     let Assets {
         meshes,
@@ -143,7 +159,8 @@ pub fn assemble(description: &Description, assets: Assets) -> Result<Resolved, R
         return Err(ResolveError { problems });
     }
     let build = || -> Result<Accelerator, crate::embree::EmbreeError> {
-        Accelerator::build(Arc::new(Device::new(0)?), &shared, &geometries)
+        let device = Device::with_limit(0, budget.left())?;
+        Accelerator::build(Arc::new(device), &shared, &geometries)
     };
     let accelerator = build().map_err(|e| ResolveError {
         problems: vec![e.to_string()],

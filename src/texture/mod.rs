@@ -1,13 +1,19 @@
 //! Images that are looked up by texture coordinates or by direction.
 
+mod cache;
+mod hdr;
 mod load;
 
+pub use cache::Images;
 pub use load::{EnvironmentImage, load_environment};
 
-use crate::description::Channel;
+use crate::memory::Budget;
+use exr::prelude::f16;
 use serde::Deserialize;
+use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// How stored values become linear ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -33,10 +39,28 @@ pub enum Interpolation {
     Closest,
 }
 
+/// The part of a texture that stands for a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha.
+    A,
+    /// The Rec. 709 luminance of the linear colour.
+    #[default]
+    Luminance,
+}
+
 /// An image that repeats over the plane of texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    image: Image,
+    /// Shared by all textures of the same file.
+    image: Arc<Image>,
     color_space: ColorSpace,
     interpolation: Interpolation,
     scale: [f32; 2],
@@ -56,6 +80,8 @@ struct Image {
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     U8(Vec<u8>),
+    U16(Vec<u16>),
+    F16(Vec<f16>),
     F32(Vec<f32>),
 }
 
@@ -66,6 +92,8 @@ pub enum Repair {
     OutOfRange(usize),
     /// So many values of an environment were negative, and became 0.
     Negative(usize),
+    /// What the file says of itself that is left aside.
+    NotApplied(&'static str),
 }
 
 impl fmt::Display for Repair {
@@ -78,6 +106,7 @@ impl fmt::Display for Repair {
                 )
             }
             Self::Negative(n) => write!(f, "{n} negative radiances set to 0"),
+            Self::NotApplied(what) => write!(f, "{what} that the image file gives is not applied"),
         }
     }
 }
@@ -105,17 +134,7 @@ impl Texture {
         scale: [f32; 2],
         offset: [f32; 2],
     ) -> Result<(Self, Vec<Repair>), TextureError> {
-        let (image, repairs) = load::image(path)?;
-        Ok((
-            Self {
-                image,
-                color_space,
-                interpolation,
-                scale,
-                offset,
-            },
-            repairs,
-        ))
+        Images::new(&Budget::of_machine()).texture(path, color_space, interpolation, scale, offset)
     }
 
     /// In pixels, width and height.
@@ -123,12 +142,14 @@ impl Texture {
         [self.image.width, self.image.height]
     }
 
-    /// In bytes, of the pixels.
-    pub fn memory(&self) -> usize {
-        match &self.image.texels {
-            Texels::U8(texels) => texels.len(),
-            Texels::F32(texels) => 4 * texels.len(),
-        }
+    /// In bytes, of the pixels of all, each image once.
+    pub fn memory(textures: &[Self]) -> usize {
+        let mut seen = HashSet::new();
+        textures
+            .iter()
+            .filter(|texture| seen.insert(Arc::as_ptr(&texture.image)))
+            .map(|texture| texture.image.memory())
+            .sum()
     }
 
     /// Linear red, green and blue, and alpha, not multiplied into them, at
@@ -138,7 +159,7 @@ impl Texture {
     /// As in Cycles (`svm_image_texture` of `kernel/svm/image.h`), sRGB values
     /// are decoded after they are interpolated.
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 4] {
-        let Image { width, height, .. } = self.image;
+        let [width, height] = self.size();
         // Only the place within one repetition counts; f64 keeps it exact far out.
         let [u, v] = [0, 1].map(|axis| {
             let place =
@@ -179,7 +200,7 @@ impl Texture {
 
     /// Linear red, green and blue, averaged over all pixels.
     pub fn mean(&self) -> [f32; 3] {
-        let Image { width, height, .. } = self.image;
+        let [width, height] = self.size();
         let mut sum = [0.0f64; 3];
         for y in 0..height {
             for x in 0..width {
@@ -210,6 +231,16 @@ impl Texture {
 }
 
 impl Image {
+    /// In bytes.
+    fn memory(&self) -> usize {
+        match &self.texels {
+            Texels::U8(texels) => size_of_val(&texels[..]),
+            Texels::U16(texels) => size_of_val(&texels[..]),
+            Texels::F16(texels) => size_of_val(&texels[..]),
+            Texels::F32(texels) => size_of_val(&texels[..]),
+        }
+    }
+
     /// Red, green, blue and alpha as stored, `y` from the bottom. Rounding may
     /// bring a place on the far edge, which is taken for the last pixel.
     fn texel(&self, x: usize, y: usize) -> [f32; 4] {
@@ -219,6 +250,8 @@ impl Image {
             let index = pixel * self.channels + channel;
             match &self.texels {
                 Texels::U8(texels) => f32::from(texels[index]) / 255.0,
+                Texels::U16(texels) => f32::from(texels[index]) / 65535.0,
+                Texels::F16(texels) => texels[index].to_f32(),
                 Texels::F32(texels) => texels[index],
             }
         };

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use smithwalk::description::Description;
 use smithwalk::film::{Aov, PixelFilter};
 use smithwalk::integrator::{Control, render};
+use smithwalk::memory::Budget;
 use smithwalk::mesh::Mesh;
 use smithwalk::scene::{Assets, Limits, RenderSettings, Resolved, Scene, assemble};
 use smithwalk::texture::EnvironmentImage;
@@ -127,7 +128,7 @@ pub fn measure(spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
                     };
                     let Resolved {
                         scene, settings, ..
-                    } = assemble(&description, assets)?;
+                    } = assemble(&description, assets, &Budget::of_machine())?;
                     let furnace = render_furnace(&scene, settings, spp, seed)?;
                     let Furnace { mean, se, .. } = furnace;
                     rows.push(Row {

@@ -1,0 +1,185 @@
+//! The channels of an OpenEXR file, and which of them are its colour.
+
+use exr::meta::MetaData;
+use exr::prelude::{FlatImage, FlatSamples, IntegerBounds, ReadChannels, ReadLayers, Text};
+use std::io::{BufRead, Seek, SeekFrom};
+
+use crate::memory::Bytes;
+
+/// What the best compression of image formats makes of one byte: deflate's 1032,
+/// of bits that become bytes.
+pub(crate) const MOST_PER_BYTE: u64 = 8300;
+
+/// Reads all that a file of `length` bytes holds, at its largest resolution, if
+/// that takes no more than `most` bytes.
+///
+/// # Errors
+/// In words, when the file is broken or too large.
+pub(crate) fn read_flat(
+    mut reader: impl BufRead + Seek + Send,
+    length: u64,
+    most: u64,
+) -> Result<FlatImage, String> {
+    let headers = MetaData::read_from_buffered(&mut reader, false)
+        .map_err(|error| error.to_string())?
+        .headers;
+    let mut bytes = 0u64;
+    for header in &headers {
+        let pixels = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+        let channels = header.channels.list.iter().map(|channel| {
+            let samples = pixels / (channel.sampling.area() as u64).max(1);
+            samples.saturating_mul(channel.sample_type.bytes_per_sample() as u64)
+        });
+        let layer = channels.fold(0u64, u64::saturating_add);
+        bytes = bytes.saturating_add(layer);
+    }
+    is_plausible(bytes, length)?;
+    if bytes > most {
+        return Err(format!(
+            "its {} of pixels are more than the {} that are left",
+            Bytes(bytes),
+            Bytes(most)
+        ));
+    }
+    if headers.iter().all(|header| header.deep) {
+        return Err("it holds deep data alone, which is not read".to_owned());
+    }
+    reader
+        .seek(SeekFrom::Start(0))
+        .map_err(|error| error.to_string())?;
+    exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(reader)
+        .map_err(|error| error.to_string())
+}
+
+/// Whether pixels of so many bytes can come from a file of that length. What is
+/// claimed is taken before it is found to be missing.
+pub(crate) fn is_plausible(bytes: u64, length: u64) -> Result<(), String> {
+    if bytes / MOST_PER_BYTE <= length {
+        return Ok(());
+    }
+    let (bytes, length) = (Bytes(bytes), Bytes(length));
+    Err(format!(
+        "it claims {bytes} of pixels, which {length} can't hold"
+    ))
+}
+
+/// A channel of a file, with its name split at the last dot.
+pub(crate) struct Plane<'a> {
+    pub layer: String,
+    pub channel: String,
+    pub window: IntegerBounds,
+    pub samples: &'a FlatSamples,
+}
+
+impl<'a> Plane<'a> {
+    pub fn all(file: &'a FlatImage) -> Vec<Self> {
+        let mut planes = Vec::new();
+        for part in &file.layer_data {
+            let part_name = part.attributes.layer_name.as_ref().map(text);
+            for channel in &part.channel_data.list {
+                let name = text(&channel.name);
+                let (layer, channel_name) = name.rsplit_once('.').unwrap_or(("", &name));
+                // In a file of several parts, a layer may be named by its part.
+                let layer = match &part_name {
+                    Some(part) if layer.is_empty() && file.layer_data.len() > 1 => part,
+                    _ => layer,
+                };
+                planes.push(Self {
+                    layer: layer.to_owned(),
+                    channel: channel_name.to_owned(),
+                    window: part.absolute_bounds(),
+                    samples: &channel.sample_data,
+                });
+            }
+        }
+        planes
+    }
+
+    pub fn full_name(&self) -> String {
+        join(&self.layer, &self.channel)
+    }
+
+    /// Whether there is a sample for each pixel.
+    pub fn is_whole(&self) -> bool {
+        self.samples.len() == self.window.size.area()
+    }
+}
+
+pub(crate) fn join(layer: &str, channel: &str) -> String {
+    if layer.is_empty() {
+        channel.to_owned()
+    } else {
+        format!("{layer}.{channel}")
+    }
+}
+
+/// The format's strings are bytes; we take and write UTF-8, as Blender does.
+pub(crate) fn text(text: &Text) -> String {
+    String::from_utf8_lossy(text.as_slice()).into_owned()
+}
+
+/// Which channels are the colour of an image.
+pub(crate) struct Chosen {
+    /// Red, green and blue; three times the same for grey.
+    pub color: [usize; 3],
+    /// The alpha of the same layer.
+    pub alpha: Option<usize>,
+}
+
+/// The indices of the colour, or what is wrong. In this order: `R`, `G`, `B`;
+/// those of the one layer called `Combined`, as in Blender's multilayer files;
+/// those of the one layer that has them; `X`, `Y`, `Z`, as of normals; a lone
+/// luminance `Y`; a lone channel of any name.
+pub(crate) fn find_color(planes: &[Plane]) -> Result<Chosen, &'static str> {
+    let find = |layer: &str, channel: &str| {
+        planes
+            .iter()
+            .position(|plane| plane.layer == layer && plane.channel.eq_ignore_ascii_case(channel))
+    };
+    let three = |layer: &str, names: [&str; 3]| {
+        let [Some(x), Some(y), Some(z)] = names.map(|name| find(layer, name)) else {
+            return None;
+        };
+        let alpha = find(layer, "A");
+        let color = [x, y, z];
+        Some(Chosen { color, alpha })
+    };
+    let rgb = |layer: &str| three(layer, ["R", "G", "B"]);
+    if let Some(chosen) = rgb("") {
+        return Ok(chosen);
+    }
+    let mut layers: Vec<&str> = planes.iter().map(|plane| plane.layer.as_str()).collect();
+    layers.sort_unstable();
+    layers.dedup();
+    layers.retain(|layer| rgb(layer).is_some());
+    let combined = |layer: &&str| layer.rsplit('.').next() == Some("Combined");
+    if layers.iter().copied().any(|layer| combined(&layer)) {
+        layers.retain(combined);
+    }
+    match layers.as_slice() {
+        [layer] => Ok(rgb(layer).expect("layers without colour were dropped")),
+        [] => {
+            if find("", "RY").is_some() || find("", "BY").is_some() {
+                return Err("and chroma (RY, BY) is not read");
+            }
+            if let Some(chosen) = three("", ["X", "Y", "Z"]) {
+                return Ok(chosen);
+            }
+            let alone = (planes.len() == 1).then_some(0);
+            let grey = find("", "Y")
+                .or(alone)
+                .ok_or("but no layer has R, G and B")?;
+            Ok(Chosen {
+                color: [grey; 3],
+                alpha: find("", "A").filter(|&alpha| alpha != grey),
+            })
+        }
+        _ => Err("but more than one layer could be meant"),
+    }
+}

@@ -1,0 +1,22 @@
+//! Files as other programs write them, one table for each kind of file: read
+//! right, or refused by name.
+
+mod files;
+mod images;
+mod meshes;
+mod scenes;
+
+/// Fails with all that is wrong at once.
+fn assert_none(faults: &[String]) {
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// A folder of its own for a test, empty at the start.
+fn directory(name: &str) -> std::path::PathBuf {
+    let path = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
+        .join("inputs")
+        .join(name);
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).unwrap();
+    path
+}
