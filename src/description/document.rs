@@ -59,8 +59,12 @@ pub(super) struct Key {
 pub(super) struct Mapping {
     entries: Vec<(Key, Node)>,
     /// Where each key is, for mappings of more than [`Mapping::FEW`].
-    index: Option<Box<HashMap<Box<str>, usize>>>,
+    index: Option<Box<Index>>,
 }
+
+/// Positions of keys. Boxed where it is used: few nodes have one.
+#[derive(Clone, Debug)]
+struct Index(HashMap<Box<str>, usize>);
 
 impl Mapping {
     /// Up to so many keys are compared one by one: most mappings have less.
@@ -72,7 +76,7 @@ impl Mapping {
 
     pub fn position(&self, name: &str) -> Option<usize> {
         match &self.index {
-            Some(index) => index.get(name).copied(),
+            Some(index) => index.0.get(name).copied(),
             None => self.entries.iter().position(|(key, _)| *key.name == *name),
         }
     }
@@ -80,12 +84,12 @@ impl Mapping {
     /// Adds an entry whose key is not there yet.
     pub fn push(&mut self, key: Key, node: Node) {
         if let Some(index) = &mut self.index {
-            index.insert(key.name.clone(), self.entries.len());
+            index.0.insert(key.name.clone(), self.entries.len());
         }
         self.entries.push((key, node));
         if self.index.is_none() && self.entries.len() > Self::FEW {
             let names = self.entries.iter().map(|(key, _)| key.name.clone());
-            self.index = Some(Box::new(names.zip(0..).collect()));
+            self.index = Some(Box::new(Index(names.zip(0..).collect())));
         }
     }
 
@@ -272,10 +276,10 @@ fn with_spaces_after_colons(text: &str) -> Cow<'_, str> {
     }
     let mut text = text.to_owned();
     for _ in 0..1 + MAX_REREAD / text.len() {
-        let refused = Parser::new_from_str(&text).find_map(|event| {
-            let error = event.err()?;
-            (error.info() == TAB_REFUSED).then(|| error.marker().index())
-        });
+        // After an error the parser gives it again without end.
+        let error = Parser::new_from_str(&text).find_map(Result::err);
+        let refused = error.filter(|error| error.info() == TAB_REFUSED);
+        let refused = refused.map(|error| error.marker().index());
         let Some(value) = refused else { break };
         let Some((value, _)) = text.char_indices().nth(value) else {
             break;
