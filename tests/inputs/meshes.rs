@@ -972,7 +972,7 @@ fn polygons() {
         ),
         (
             "concave ones in a row",
-            [format!("{ARROW}"), "f 1 2 3 4\n".repeat(100)]
+            [ARROW.to_owned(), "f 1 2 3 4\n".repeat(100)]
                 .concat()
                 .into_bytes(),
             Area(25.0, 200),
