@@ -71,7 +71,8 @@ class ExportTest(unittest.TestCase):
                 if words[0] == "v":
                     positions.append(tuple(float(w) for w in words[1:]))
                 elif words[0] == "f":
-                    triangles.append(tuple(int(w.split("/")[0]) - 1 for w in words[1:]))
+                    corners = [int(w.split("/")[0]) - 1 for w in words[1:]]
+                    triangles += [(corners[0], b, c) for b, c in zip(corners[1:], corners[2:])]  # as a fan
         return positions, triangles
 
     def cube(self, **settings):

@@ -42,7 +42,7 @@ _OTHER_ENGINES = re.compile(
     r"cutoff_distance|distance$|falloff_|linear_|quadratic_|constant_|surface_cache|"
     r"use_grease|use_solid|use_strand|max_vertex_displacement")
 _COST = re.compile(
-    r"debug_|device$|denois|adaptive|scrambling|sampling_pattern|auto_scrambling|use_guiding|"
+    r"debug_|device$|(use_)?denois|(use_)?adaptive|scrambling|sampling_pattern|auto_scrambling|use_guiding|"
     r"guiding|use_deterministic|use_surface_guiding|surface_guiding|use_volume_guiding|volume_guiding|"
     r"direct_light_sampling|min_light_bounces|min_transparent|light_sampling_threshold|use_light_tree|"
     r"tile_size|use_auto_tile|texture_limit|feature_set|shading_system|sample_offset|use_sample_subset|"
@@ -173,7 +173,8 @@ class Defaults:
             self._structs["Object"] = harvest(block)
             for name in dir(bpy.types):
                 kind = getattr(bpy.types, name)
-                if not name.startswith("ShaderNode") or name.endswith(("Tree", "Group")):
+                if not name.startswith("ShaderNode") or name in {"ShaderNode", "ShaderNodeTree"} \
+                        or name.endswith("Group"):
                     continue
                 try:
                     node = tree.nodes.new(name)

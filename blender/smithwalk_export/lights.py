@@ -285,10 +285,13 @@ def _clipping(scene, depsgraph, camera_ob, near, far, where, log):
     cut = []
     for instance in depsgraph.object_instances:
         ob = instance.object
-        if ob.type == "LIGHT" or not instance.show_self or not is_finite(instance.matrix_world):
+        if ob.type != "MESH" or not instance.show_self or not is_finite(instance.matrix_world):
             continue
         depths = [-(to_camera @ instance.matrix_world @ Vector(c)).z for c in ob.bound_box]
-        if max(depths) > far or min(depths) < near < max(depths):
+        # A floor that reaches behind the camera is cut by every near plane: only
+        # one that was moved away from where Blender puts it counts then.
+        nearer = min(depths) < near and max(depths) > 0.0 and (min(depths) > 0.0 or near > 0.1001)
+        if max(depths) > far or nearer:
             cut.append(ob.name)
         if len(cut) > 3:
             break

@@ -4,7 +4,8 @@ Positions are object space, metres, z up. Every polygon is written as
 Blender's own triangles (a renderer's fan would differ on concave n-gons),
 with split normals, so that flat, smooth, auto-smooth and custom normals all
 arrive as they are. Positions and UVs have nine significant digits, with which
-a float32 survives exactly; normals, directions, have five decimals.
+a float32 survives exactly; normals, directions, are written
+in steps of 1e-5.
 """
 
 import hashlib
@@ -32,7 +33,8 @@ class MeshWriter:
         self.files = files     # where files go (files.Folder)
         self.log = log
         self.meshes = {}       # mesh name → file name
-        self._by_hash = {}     # hash of the arrays → mesh name
+        self._names = {}       # identity of the arrays, from `_same` → mesh name
+        self._first = {}       # quick signature → [identity, arrays until a second mesh has the same one]
         self._by_key = {}      # evaluated data, UVs, transform → (mesh name, used slots) or None
 
     def add(self, ob, uv=None, transform=None, progress=None):
@@ -47,6 +49,17 @@ class MeshWriter:
         if key not in self._by_key:
             self._by_key[key] = self._write(ob, uv, transform, progress)
         return self._by_key[key]
+
+    def _same(self, arrays):
+        """What equal arrays share. Only meshes that look alike at first glance are hashed."""
+        signature = arrays.signature()
+        entry = self._first.setdefault(signature, [signature, arrays])
+        if entry[1] is arrays:
+            return signature
+        if isinstance(entry[1], Arrays):
+            entry[1] = entry[1].digest()
+        digest = arrays.digest()
+        return signature if digest == entry[1] else digest
 
     def _write(self, ob, uv, transform, progress):
         mesh = ob.to_mesh()
@@ -63,11 +76,11 @@ class MeshWriter:
                                                  "finite are left out")
         if not arrays.slots:
             return None
-        digest = arrays.digest()
-        name = self._by_hash.get(digest)
+        same = self._same(arrays)
+        name = self._names.get(same)
         if name is None:
             # Evaluated data has names of its own in some versions.
-            name = self._by_hash[digest] = unique_name(ob.original.data.name, self.meshes)
+            name = self._names[same] = unique_name(ob.original.data.name, self.meshes)
             path, file = self.files.new(f"{name}.obj")
             self.meshes[name] = file
             with open(path, "w", encoding="ascii") as f:
@@ -95,100 +108,150 @@ def _corner_normals(mesh):
     return _floats(mesh.corner_normals, "vector", 3, count)
 
 
-def _distinct(rows):
-    """Distinct rows of small integers and each row's index: through one 64-bit key per row."""
-    low = rows.min(axis=0)
-    span = [int(s) + 1 for s in (rows.max(axis=0) - low)]
-    key = np.zeros(len(rows), dtype=np.int64)
-    for column, width in zip((rows - low).T, span):
-        key = key * width + column
-    _, first, index = np.unique(key, return_index=True, return_inverse=True)
-    return rows[first], index.reshape(-1)
+def _indexed(keys, rows, vertex_of, count):
+    """Distinct rows, and the row of each corner: one per vertex as far as its corners agree.
+
+    `keys` holds one 64-bit number per corner that is the same where rows are.
+    """
+    first = np.zeros(count, dtype=np.int64)
+    at = np.zeros(count, dtype=np.int32)
+    first[vertex_of] = keys  # of a vertex's corners the last one counts
+    at[vertex_of] = np.arange(len(keys), dtype=np.int32)
+    odd = first[vertex_of] != keys
+    share = np.count_nonzero(odd) / max(len(keys), 1)
+    if share > 0.25:  # flat shading, say: rows per vertex would be for nothing
+        _, where, index = np.unique(keys, return_index=True, return_inverse=True)
+        return rows[where], index.reshape(-1)
+    values, index = rows[at], vertex_of.copy()
+    if share:
+        _, where, more = np.unique(keys[odd], return_index=True, return_inverse=True)
+        values = np.concatenate([values, rows[odd][where]])
+        index[odd] = count + more.reshape(-1)
+    return values, index
+
+
+def _polygons(mesh, loop_count):
+    """Polygons whose fan from the first corner is Blender's own triangulation stay whole.
+
+    Returns (corners, loops, slots) per number of corners: loops is an array
+    (polygon, corner) of loop indices.
+    """
+    count = len(mesh.polygons)
+    starts = _integers(mesh.polygons, "loop_start", count)
+    totals = _integers(mesh.polygons, "loop_total", count)
+    slots = _integers(mesh.polygons, "material_index", count)
+    # Blender clamps the indices of faces whose slot was removed.
+    slots = np.clip(slots, 0, max(len(mesh.materials) - 1, 0))
+    triangle_count = len(mesh.loop_triangles)
+    triangles = _integers(mesh.loop_triangles, "loops", triangle_count * 3).reshape(-1, 3)
+    owner = _integers(mesh.loop_triangles, "polygon_index", triangle_count)
+    # A quad is a fan from its first corner if its triangles are (0, 1, 2) and
+    # (0, 2, 3): the others, (0, 1, 3) and (1, 2, 3), have sums of their own.
+    total = triangles.sum(axis=1, dtype=np.int32) - 3 * starts[owner]
+    is_quad = totals == 4
+    broken = np.zeros(count, dtype=bool)
+    broken[owner[is_quad[owner] & (total != 3) & (total != 5)]] = True
+    del total
+    whole = is_quad & ~broken
+    quads = starts[whole][:, None] + np.arange(4)
+    single = ~whole[owner]
+    return [(quads, slots[whole]), (triangles[single], slots[owner[single]])]
 
 
 class Arrays:
-    """A mesh as an OBJ holds it: vertices, normals, UVs, triangles by slot."""
+    """A mesh as an OBJ holds it: vertices, normals, UVs, faces by slot."""
 
     def __init__(self, mesh, uv=None, transform=None):
-        self.positions = _floats(mesh.vertices, "co", 3, len(mesh.vertices))
-        normals = _corner_normals(mesh)
+        count = len(mesh.vertices)
+        self.positions = _floats(mesh.vertices, "co", 3, count)
         if uv is None:
             layer = next((l for l in mesh.uv_layers if l.active_render), None)
             uv = _floats(layer.data, "uv", 2, len(mesh.loops)) if layer and len(layer.data) else None
         if transform is not None:
             matrix = np.array(transform, dtype=np.float64)
             self.positions = (self.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
-
+        vertex_of = _integers(mesh.loops, "vertex_index", len(mesh.loops))
         mesh.calc_loop_triangles()
-        count = len(mesh.loop_triangles)
-        loops = _integers(mesh.loop_triangles, "loops", count * 3).reshape(count, 3)
-        vertices = _integers(mesh.loop_triangles, "vertices", count * 3).reshape(count, 3)
-        slots = _integers(mesh.loop_triangles, "material_index", count)
-        # Blender clamps the indices of faces whose slot was removed.
-        slots = np.clip(slots, 0, max(len(mesh.materials) - 1, 0))
+        polygons = _polygons(mesh, len(mesh.loops))
 
         finite = np.isfinite(self.positions).all(axis=1)
         self.left_out = 0
         if not finite.all():
-            keep = finite[vertices].all(axis=1)
-            self.left_out = int(count - keep.sum())
-            loops, vertices, slots = loops[keep], vertices[keep], slots[keep]
+            kept = [(l, s, finite[vertex_of[l]].all(axis=1)) for l, s in polygons]
+            self.left_out = int(sum((~k).sum() for _, _, k in kept))
+            polygons = [(l[k], s[k]) for l, s, k in kept]
             self.positions[~finite] = 0.0
 
-        normals[~np.isfinite(normals).all(axis=1)] = 0.0
-        grid = np.rint(normals * 1e5).astype(np.int64)
-        flat_matrix = transform is not None and abs(np.linalg.det(np.array(transform)[:3, :3])) == 0.0
-        if flat_matrix or not len(grid):
-            self.normals = None
-            normal_index = None
-        else:
-            rows, index = _distinct(grid)
-            self.normals = rows * 1e-5
-            normal_index = index[loops]
-        self.uvs = None
-        uv_index = None
+        # A mesh that its object's scale flattens has no normals that could be
+        # brought to the scene: it is shaded flat, as it is.
+        flattened = transform is not None
+        self.normals = normal_index = None
+        if not flattened and len(vertex_of):
+            normals = _corner_normals(mesh)
+            normals[~np.isfinite(normals).all(axis=1)] = 0.0
+            np.rint(np.multiply(normals, 1e5, out=normals), out=normals)
+            keys = normals[:, 0].astype(np.int64)
+            for i in (1, 2):
+                keys *= 200_001
+                keys += normals[:, i].astype(np.int64)
+            self.normals, normal_index = _indexed(keys, normals, vertex_of, count)
+            self.normals = self.normals.astype(np.int32)  # in units of 1e-5
+            del normals, keys
+        self.uvs = uv_index = None
         if uv is not None and len(uv):
             uv = np.where(np.isfinite(uv), uv, 0.0).astype(np.float32)
             # Two float32 side by side are one 64-bit key; + 0 makes −0 the same as 0.
-            key = np.ascontiguousarray(uv + 0.0).view(np.int64).reshape(-1)
-            _, first, index = np.unique(key, return_index=True, return_inverse=True)
-            self.uvs, uv_index = uv[first], index.reshape(-1)[loops]
+            keys = np.ascontiguousarray(uv + 0.0).view(np.int64).reshape(-1)
+            self.uvs, uv_index = _indexed(keys, uv, vertex_of, count)
 
-        columns = [vertices] + [i for i in (uv_index, normal_index) if i is not None]
-        table = np.stack(columns, axis=2) + 1  # (triangle, corner, index kind), from 1
-        self.slots = [int(s) for s in np.unique(slots)]
-        self.faces = {s: table[slots == s].reshape(-1, 3 * len(columns)) for s in self.slots} \
-            if len(self.slots) > 1 else {s: table.reshape(-1, 3 * len(columns)) for s in self.slots}
-        corner = {(True, True): "%d/%d/%d", (True, False): "%d/%d", (False, True): "%d//%d",
-                  (False, False): "%d"}[self.uvs is not None, self.normals is not None]
-        self._face = f"f {corner} {corner} {corner}\n"
+        indices = [i for i in (vertex_of, uv_index, normal_index) if i is not None]
+        self.slots = sorted(set().union(*(np.unique(s).tolist() for _, s in polygons)))
+        self.faces = {slot: [] for slot in self.slots}
+        for loops, slots in polygons:
+            for slot in self.slots:
+                chosen = loops[slots == slot] if len(self.slots) > 1 else loops
+                if len(chosen):
+                    table = np.stack([i[chosen] for i in indices], axis=2).astype(np.int32, copy=False)
+                    table += 1
+                    self.faces[slot].append(table.reshape(len(chosen), -1))
+        self._corner = {(True, True): " %d/%d/%d", (True, False): " %d/%d", (False, True): " %d//%d",
+                        (False, False): " %d"}[self.uvs is not None, self.normals is not None]
+        self._width = len(indices)
+
+    def signature(self):
+        """What is the same for equal meshes and quick to find."""
+        return (len(self.positions), tuple(self.slots), tuple(len(t) for f in self.faces.values() for t in f),
+                self.positions[:4].tobytes())
 
     def digest(self):
         """A hash of all that the file would hold."""
-        sha = hashlib.sha256(self._face.encode())
-        for array in (self.positions, self.normals, self.uvs, *self.faces.values()):
-            sha.update(b"" if array is None else np.ascontiguousarray(array).tobytes())
-        sha.update(str(self.slots).encode())
+        sha = hashlib.sha256((self._corner + str(self.slots)).encode())
+        for array in (self.positions, self.normals, self.uvs, *(t for f in self.faces.values() for t in f)):
+            sha.update(b"" if array is None else np.ascontiguousarray(array))
         return sha.digest()
 
     def write(self, out, progress=None):
         """The OBJ. Faces of slot n stand under `usemtl slot_n` when more than one is used."""
-        total = len(self.positions) + sum(map(len, self.faces.values()))
+        tables = [t for f in self.faces.values() for t in f]
+        total = sum(len(r) for r in (self.positions, self.uvs, self.normals, *tables) if r is not None)
         done = 0
+
+        def lines(rows, line):
+            nonlocal done
+            for written in _format(out, rows, line):
+                done += written
+                if progress:
+                    progress(done / total)
+
         for rows, line in ((self.positions, "v %.9g %.9g %.9g\n"), (self.uvs, "vt %.9g %.9g\n"),
-                           (self.normals, "vn %.5g %.5g %.5g\n")):
+                           (self.normals, "vn %de-5 %de-5 %de-5\n")):
             if rows is not None:
-                for chunk in _format(out, rows, line):
-                    done += chunk
-                    if progress:
-                        progress(done / total)
+                lines(rows, line)
         for slot in self.slots:
             if len(self.slots) > 1:
                 out.write(f"usemtl slot_{slot}\n")
-            for chunk in _format(out, self.faces[slot], self._face):
-                done += chunk
-                if progress:
-                    progress(min(done / total, 1.0))
+            for table in self.faces[slot]:
+                lines(table, "f" + self._corner * (table.shape[1] // self._width) + "\n")
 
 
 def _format(out, rows, line):

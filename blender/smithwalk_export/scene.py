@@ -123,17 +123,18 @@ class Job:
     """One export: what it needs to know, and the parts that write."""
 
     def __init__(self, scene, folder, log=None, bake=BAKE, bake_size=BAKE_SIZE, layer=None,
-                 progress=progress_to_terminal):
+                 progress=progress_to_terminal, by_engine=False):
         self.scene = scene
         self.folder = folder
         self.log = log or Log()
         self.audit = Audit()
         self.layer = layer
         self.progress = progress
-        self.composited = settings.has_compositor(scene)
+        self.composited = not by_engine and settings.has_compositor(scene)
         self.border = scene.render.use_border
         self.has_camera = scene.camera is not None
         self.bake = bake
+        self.by_engine = by_engine  # Blender itself sees to the compositor, the region, other view layers
         self.baker = Baker(bake_size, bake == BAKE, self.log, progress)
         self.materials = MaterialWriter(None, self.log, self.audit)
         view_layer = scene.view_layers.get(layer) if layer else next(
@@ -152,6 +153,13 @@ class Job:
         self.world.prepare()
         if any(self._needs(m).requests or asks_for_uv_maps(m) for m in bpy.data.materials if m.users):
             _with_depsgraph(self.scene, self.layer, self.plan)
+            self.baker.run()
+
+    def prepare_from(self, depsgraph):
+        """Within a render: what earlier bakes left in the cache."""
+        self.world.prepare()
+        if any(self._needs(m).requests or asks_for_uv_maps(m) for m in bpy.data.materials if m.users):
+            self.plan(depsgraph)
             self.baker.run()
 
     def _needs(self, material):
@@ -228,12 +236,12 @@ class Job:
         render = scene.render
         border, render.use_border = render.use_border, self.border
         try:
-            settings.tell(scene, depsgraph.view_layer, self.audit, log, self.composited)
+            settings.tell(scene, depsgraph.view_layer, self.audit, log, self.composited, self.by_engine)
             options = settings.options(scene)
         finally:
             render.use_border = border
         others = [l.name for l in scene.view_layers if l.use and l.name != depsgraph.view_layer.name]
-        if others:
+        if others and not self.by_engine:
             log.warn("scene", f'only view layer "{depsgraph.view_layer.name}" is written, not '
                               + ", ".join(f'"{n}"' for n in others))
 

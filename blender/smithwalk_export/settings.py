@@ -15,7 +15,7 @@ _ACCEPTED = (
     "render.use_simplify", "render.simplify_subdivision", "render.simplify_subdivision_render",
     "render.simplify_child_particles", "render.simplify_child_particles_render", "render.simplify_volumes",
     "render.use_multiview", "render.compositor", "render.line_thickness_mode", "render.line_thickness",
-    "cycles.samples", "cycles.seed", "cycles.time_limit", "cycles.volume_step_rate", "cycles.volume_bounces",
+    "smithwalk", "cycles.samples", "cycles.seed", "cycles.time_limit", "cycles.volume_step_rate", "cycles.volume_bounces",
     "cycles.volume_max_steps", "cycles.dicing_rate", "cycles.max_subdivisions", "cycles.dicing_camera",
     "cycles.film_transparent_glass", "cycles.film_transparent_roughness", "cycles.rolling_shutter_type",
     "cycles.rolling_shutter_duration", "cycles.motion_blur_position", "cycles.transparent_max_bounces",
@@ -60,6 +60,8 @@ def options(scene):
     """What of the settings `smithwalk render` takes as options: noise, time, region."""
     cycles, render = scene.cycles, scene.render
     chosen = []
+    if cycles.use_adaptive_sampling or cycles.time_limit > 0.0:
+        chosen += ["--spp", str(max(cycles.samples, 1))]  # else noise or time alone decide
     if cycles.use_adaptive_sampling:
         # 0 lets Cycles choose by the samples: 1/√samples is about what it takes.
         chosen += ["--noise", f"{cycles.adaptive_threshold or cycles.samples ** -0.5:.4g}"]
@@ -83,7 +85,7 @@ def border(render):
     return x0, height - y1, x1, height - y0
 
 
-def tell(scene, view_layer, audit, log, composited):
+def tell(scene, view_layer, audit, log, composited, by_engine=False):
     """Name every setting that the scene file does not hold."""
     cycles, render = scene.cycles, scene.render
     view = audit.view(scene)
@@ -136,10 +138,10 @@ def tell(scene, view_layer, audit, log, composited):
         log.warn("scene", "the compositor is left out")
     if scene.sequence_editor and len(getattr(scene.sequence_editor, "strips",
                                              getattr(scene.sequence_editor, "sequences", ()))) \
-            and render.use_sequencer:
+            and render.use_sequencer and not by_engine:
         log.warn("scene", "the sequencer is left out")
     region = border(render)
-    if region:
+    if region and not by_engine:
         log.warn("scene", "the render region is not part of a scene: the whole frame is written "
                           f"(render it with --crop {','.join(map(str, region))})")
     for what in audit.leftovers(scene):
