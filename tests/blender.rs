@@ -84,6 +84,22 @@ fn a_failed_export_has_an_exit_code() {
     assert!(stderr.contains("/dev/null/scene"), "{stderr}");
 }
 
+/// What the exporter writes is never refused: every shader node, light, world and
+/// camera at the ends of their ranges, meshes and matrices that are not finite.
+#[test]
+fn every_closure_that_is_exported_loads() {
+    if blender_version().is_none() {
+        return;
+    }
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("every_closure");
+    script(None, "every_closure.py", &[folder.to_str().expect("UTF-8")]);
+    for name in ["closures", "lights", "shapes", "cameras", "worlds"] {
+        run(Command::new(env!("CARGO_BIN_EXE_smithwalk"))
+            .arg("info")
+            .arg(folder.join(name).join("scene.yaml")));
+    }
+}
+
 /// The sequence of the documentation: build, export, render, render with
 /// Cycles, compare. Multiple scattering stands against the walk of Cycles 3.x,
 /// whose departures from the model the bound of 0.5 % leaves room for; 4.x has

@@ -9,6 +9,7 @@ import math
 import bpy
 from mathutils import Vector
 
+from .meshes import FARTHEST
 from .nodes import Graph, Unknown, describe
 
 # The smallest size and angle that are written for 0: Cycles uses a tiny area then.
@@ -21,8 +22,8 @@ def matrix(m):
 
 
 def is_finite(m):
-    """Whether all of a matrix is finite."""
-    return all(math.isfinite(x) for row in m for x in row)
+    """Whether all of a matrix is finite, and not beyond what single precision can square."""
+    return all(abs(x) <= FARTHEST for row in m for x in row)
 
 
 def light_units():

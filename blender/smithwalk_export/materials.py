@@ -360,7 +360,7 @@ class _Surface:
             anisotropy = self.scalar(node, "Anisotropy", groups, -1.0, 1.0)
             if anisotropy != 0.0:
                 keys["anisotropy"] = anisotropy
-                rotation = self.scalar(node, "Rotation", groups)
+                rotation = self.turns(node, "Rotation", groups)
                 if rotation != 0.0:
                     keys["rotation"] = rotation
                 keys.update(self.tangent(node, groups))
@@ -392,6 +392,11 @@ class _Surface:
         f0 = self.color(node, "Base Color", groups)
         tint = self.color(node, "Edge Tint", groups)
         return {"conductor": {**keys, "f0": f0, **({"edge_tint": tint} if tint != 1.0 else {})}}
+
+    def turns(self, node, name, groups):
+        """A rotation: whole turns change nothing."""
+        value = self.scalar(node, name, groups)
+        return value if isinstance(value, dict) else value % 1.0
 
     def ior(self, node, groups):
         """An index of refraction; Cycles keeps it above 0."""
@@ -521,7 +526,7 @@ class _Surface:
                 and node.inputs["Thin Film Thickness"].default_value == 0.0:
             self.idle(node, *_IDLE["Thin Film Thickness"])
         if keys.get("anisotropic"):
-            rotation = self.scalar(node, "Anisotropic Rotation", groups)
+            rotation = self.turns(node, "Anisotropic Rotation", groups)
             if rotation != 0.0:
                 keys["anisotropic_rotation"] = rotation
             keys.update(self.tangent(node, groups))

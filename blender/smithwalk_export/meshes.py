@@ -14,6 +14,7 @@ import re
 
 import numpy as np
 
+FARTHEST = 1e18    # metres: squares of larger coordinates leave single precision
 _LINES = 100_000  # formatted at a time: bounds the memory of the text
 
 
@@ -72,8 +73,8 @@ class MeshWriter:
         finally:
             ob.to_mesh_clear()
         if arrays.left_out:
-            self.log.note(f'object "{ob.name}"', f"{arrays.left_out} triangle(s) with a vertex that is not "
-                                                 "finite are left out")
+            self.log.note(f'object "{ob.name}"', f"{arrays.left_out} face(s) with a vertex that is not "
+                                                 "finite, or out of reach, are left out")
         if not arrays.slots:
             return None
         same = self._same(arrays)
@@ -174,7 +175,7 @@ class Arrays:
         mesh.calc_loop_triangles()
         polygons = _polygons(mesh, len(mesh.loops))
 
-        finite = np.isfinite(self.positions).all(axis=1)
+        finite = (np.abs(self.positions) <= FARTHEST).all(axis=1)  # false for NaN
         self.left_out = 0
         if not finite.all():
             kept = [(l, s, finite[vertex_of[l]].all(axis=1)) for l, s in polygons]

@@ -15,7 +15,7 @@ _ACCEPTED = (
     "render.use_simplify", "render.simplify_subdivision", "render.simplify_subdivision_render",
     "render.simplify_child_particles", "render.simplify_child_particles_render", "render.simplify_volumes",
     "render.use_multiview", "render.compositor", "render.line_thickness_mode", "render.line_thickness",
-    "smithwalk", "cycles.samples", "cycles.seed", "cycles.time_limit", "cycles.volume_step_rate", "cycles.volume_bounces",
+    "view_settings", "smithwalk", "cycles.samples", "cycles.seed", "cycles.time_limit", "cycles.volume_step_rate", "cycles.volume_bounces",
     "cycles.volume_max_steps", "cycles.dicing_rate", "cycles.max_subdivisions", "cycles.dicing_camera",
     "cycles.film_transparent_glass", "cycles.film_transparent_roughness", "cycles.rolling_shutter_type",
     "cycles.rolling_shutter_duration", "cycles.motion_blur_position", "cycles.transparent_max_bounces",
@@ -119,6 +119,16 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
     if general:
         log.general("scene", "Cycles' " + ", ".join(general) + " have no counterpart")
 
+    if not by_engine:
+        view_settings = scene.view_settings
+        usual = view_settings.view_transform in {"Filmic", "AgX", "Standard"} and view_settings.look == "None" \
+            and view_settings.gamma == 1.0 and not view_settings.use_curve_mapping
+        grade = log.general if usual else log.warn
+        if view_settings.view_transform != "Standard" or not usual:
+            grade("scene", f"PNG files are plain sRGB: the view transform {view_settings.view_transform}"
+                           + ("" if view_settings.look == "None" else f", look {view_settings.look}")
+                           + ("" if view_settings.gamma == 1.0 else f", gamma {view_settings.gamma:g}")
+                           + " is not applied")
     for kind in ("reflective", "refractive"):
         if not getattr(cycles, f"caustics_{kind}"):
             log.warn("scene", f"{kind} caustics are off in Blender and are rendered here")

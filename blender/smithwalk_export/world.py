@@ -16,8 +16,8 @@ from .bake import uniform
 from .lights import matrix
 from .nodes import Graph, LINEAR_SPACES, describe, link_into
 
-_WIDTH = 2048
-_LARGEST_WIDTH = 4096
+_WIDTH = 1024       # of what no image gives more detail
+_LARGEST_WIDTH = 4096  # of an image that is followed
 
 
 class WorldWriter:
