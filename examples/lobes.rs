@@ -26,7 +26,7 @@ use glam::Vec3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use smithwalk::bsdf::{Albedos, Method, Normals, Rough, WhiteFacets, Width};
+use smithwalk::bsdf::{Albedos, Distribution, Method, Rough, WhiteFacets, Width};
 use smithwalk::report::heightfield::{
     Config, Estimate, LobeCase, Material, PSI_BINS, outgoing_lobes,
 };
@@ -179,7 +179,7 @@ struct Compared {
 
 impl Compared {
     fn new<N: Ndf<Scalar = f64> + Sync, S: Width>(
-        normals: (Normals, &'static str),
+        normals: (Distribution, &'static str),
         (ndf, ndf_of_renderer): (N, S),
         (alpha, cos): (f64, f64),
     ) -> Self {
@@ -302,12 +302,12 @@ fn compare() -> Result<Vec<Compared>, Box<dyn Error>> {
     for (alpha, cos) in CASES {
         let narrow = alpha as f32;
         all.push(Compared::new(
-            (Normals::Ggx, "GGX"),
+            (Distribution::Ggx, "GGX"),
             (Ggx::isotropic(alpha), Ggx::isotropic(narrow)),
             (alpha, cos),
         ));
         let mut beckmann = Compared::new(
-            (Normals::Beckmann, "Beckmann"),
+            (Distribution::Beckmann, "Beckmann"),
             (Beckmann::isotropic(alpha), Beckmann::isotropic(narrow)),
             (alpha, cos),
         );

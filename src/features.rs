@@ -35,7 +35,7 @@ features! {
     /// Roughness that differs by direction.
     ANISOTROPY = 7, "anisotropy", "a tangent per hit";
     /// Materials of more than one closure.
-    MIXES = 8, "mixes", "up to eight closures per hit";
+    MIXES = 8, "mixes", "up to sixteen closures per hit";
     /// Surfaces that let light straight through.
     TRANSPARENCY = 9, "transparent shadows", "shadow rays that step through surfaces";
     /// A camera with an aperture.
@@ -52,6 +52,14 @@ features! {
     DIFFUSE_FACETS = 15, "diffuse facets", "closures of theirs in the kernel";
     /// Facets with Gaussian slopes.
     BECKMANN = 16, "Beckmann slopes", "a second distribution in every rough closure";
+    /// Dielectric facets whose reflection and transmission are apart.
+    SPLIT_GLASS = 17, "glass in parts", "refraction alone, and glass with two colours, in the kernel";
+    /// Wide lobes other than Lambert's on the viewer's side.
+    DIFFUSERS = 18, "other diffuse lobes", "rough diffuse, translucent, velvet and sheen closures in the kernel";
+    /// Weights of mixes, or emission, that depend on who looks.
+    VIEW_DEPENDENT = 19, "view-dependent mixes", "Fresnel's factor, facing and the like per hit";
+    /// Blender's node.
+    PRINCIPLED = 20, "principled", "the node's layers put together per hit";
 }
 
 impl Features {

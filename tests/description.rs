@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use smithwalk::description::{
-    Aperture, AreaShape, Assignment, Axis, Channel, Color, Description, Estimator, Film, Filter,
-    LightKind, LightUnits, Material, MaterialRef, Opening, Projection, Reflectance, Roughness,
-    Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
+    Aperture, AreaShape, Assignment, Axis, Channel, Color, Description, Estimator, Factor, Film,
+    Filter, LightKind, LightUnits, Material, MaterialRef, Opening, Projection, Reflectance,
+    Roughness, Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
 };
 use smithwalk::film::Aov;
 use smithwalk::texture::{ColorSpace, Interpolation};
@@ -236,8 +236,8 @@ fn materials_take_every_documented_key() {
         other => panic!("expected a conductor, found {other:?}"),
     };
     let complex = Reflectance::Complex {
-        eta: [0.2, 0.9, 1.1],
-        k: [3.9; 3],
+        eta: Color::Value([0.2, 0.9, 1.1]),
+        k: Color::Value([3.9; 3]),
     };
     assert_eq!(
         reflectance("conductor: {eta: [0.2, 0.9, 1.1], k: 3.9}"),
@@ -245,13 +245,15 @@ fn materials_take_every_documented_key() {
     );
     assert_eq!(
         reflectance("conductor: {f0: 0.5}"),
-        Reflectance::Schlick { f0: [0.5; 3] }
+        Reflectance::Schlick {
+            f0: Color::Value([0.5; 3])
+        }
     );
     assert_eq!(
         reflectance("conductor: {f0: 0.5, f82: [1, 0, 1]}"),
         Reflectance::F82 {
-            f0: [0.5; 3],
-            f82: [1.0, 0.0, 1.0]
+            f0: Color::Value([0.5; 3]),
+            f82: Color::Value([1.0, 0.0, 1.0])
         }
     );
     assert_eq!(
@@ -264,7 +266,7 @@ fn materials_take_every_documented_key() {
     else {
         panic!("expected a mix")
     };
-    assert_eq!(mix.factor, Scalar::Value(0.5));
+    assert_eq!(mix.factor, Factor::Share(Scalar::Value(0.5)));
     assert!(matches!(&mix.a, MaterialRef::Inline(a) if matches!(**a, Material::Diffuse(_))));
     assert!(matches!(&mix.b, MaterialRef::Inline(b) if matches!(**b, Material::Mix(_))));
 
@@ -289,8 +291,8 @@ fn materials_take_every_documented_key() {
         }
     );
     assert_eq!(
-        (glass.ior, &glass.color),
-        (0.75, &Color::Texture("t".into()))
+        (&glass.ior, &glass.color),
+        (&Scalar::Value(0.75), &Color::Texture("t".into()))
     );
 }
 

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use super::{BsdfSample, Interface, Lambert, Mirror, Rough};
+use super::{BsdfSample, ByFacets, Diffuser, Interface, Lambert, Mirror, Rough, RoughClosure};
 use crate::color::Rgb;
 use crate::features::{Features, has};
-use smithwalk_model::{self as model, Beckmann, Conductor, Dielectric, Diffuse, Draw, Ggx, Tally};
+use smithwalk_model::{self as model, Beckmann, Conductor, Draw, Ggx, Tally};
 
 /// Everything that a surface can scatter with.
 #[derive(Clone, Copy, Debug)]
@@ -18,39 +18,16 @@ pub enum Closure {
     Interface(Interface),
     /// Lets this share of the light straight through.
     Transparent(Rgb),
-    /// Rough metal, GGX.
-    GgxConductor(Rough<Ggx<f32>, Conductor<f32>>),
-    /// Rough metal, Beckmann.
-    BeckmannConductor(Rough<Beckmann<f32>, Conductor<f32>>),
-    /// Rough glass, GGX.
-    GgxDielectric(Rough<Ggx<f32>, Dielectric<f32>>),
-    /// Rough glass, Beckmann.
-    BeckmannDielectric(Rough<Beckmann<f32>, Dielectric<f32>>),
-    /// Diffuse facets, GGX.
-    GgxDiffuse(Rough<Ggx<f32>, Diffuse<f32>>),
-    /// Diffuse facets, Beckmann.
-    BeckmannDiffuse(Rough<Beckmann<f32>, Diffuse<f32>>),
+    /// A microsurface.
+    Rough(RoughClosure),
+    /// Another wide lobe.
+    Diffuser(Diffuser),
 }
 
 /// The closures that can be evaluated for several directions at once.
 pub(super) enum Laned<'a> {
     Ggx(&'a Rough<Ggx<f32>, Conductor<f32>>),
     Beckmann(&'a Rough<Beckmann<f32>, Conductor<f32>>),
-}
-
-/// Runs `$body` for whichever rough closure it is, and `$other` for the rest.
-macro_rules! each_rough {
-    ($closure:expr, $rough:ident => $body:expr, $($other:tt)*) => {
-        match $closure {
-            Closure::GgxConductor($rough) => $body,
-            Closure::BeckmannConductor($rough) => $body,
-            Closure::GgxDielectric($rough) => $body,
-            Closure::BeckmannDielectric($rough) => $body,
-            Closure::GgxDiffuse($rough) => $body,
-            Closure::BeckmannDiffuse($rough) => $body,
-            $($other)*
-        }
-    };
 }
 
 /// Below this cosine a direction counts as inside the surface: nothing is
@@ -62,23 +39,13 @@ impl Closure {
     /// a match, it takes the other arms out of it.
     #[inline(always)]
     pub(super) fn is_in<const F: u32>(&self) -> bool {
-        let (metals, glass, matte, beckmann) = (
-            has::<F>(Features::METALS),
-            has::<F>(Features::TRANSMISSION),
-            has::<F>(Features::DIFFUSE_FACETS),
-            has::<F>(Features::BECKMANN),
-        );
         match self {
             Self::Lambert(_) => true,
-            Self::Mirror(_) => metals,
-            Self::Interface(_) => glass,
+            Self::Mirror(_) => has::<F>(Features::METALS),
+            Self::Interface(_) => has::<F>(Features::TRANSMISSION),
             Self::Transparent(_) => has::<F>(Features::TRANSPARENCY),
-            Self::GgxConductor(rough) => metals && rough.is_in::<F>(),
-            Self::BeckmannConductor(rough) => metals && beckmann && rough.is_in::<F>(),
-            Self::GgxDielectric(rough) => glass && rough.is_in::<F>(),
-            Self::BeckmannDielectric(rough) => glass && beckmann && rough.is_in::<F>(),
-            Self::GgxDiffuse(rough) => matte && rough.is_in::<F>(),
-            Self::BeckmannDiffuse(rough) => matte && beckmann && rough.is_in::<F>(),
+            Self::Rough(rough) => rough.is_in::<F>(),
+            Self::Diffuser(_) => has::<F>(Features::DIFFUSERS),
         }
     }
 
@@ -100,12 +67,18 @@ impl Closure {
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return None;
         }
-        let sample = each_rough!(self, rough => rough.sample(wo, rng)?,
+        let sample = match self {
+            Self::Rough(rough) => rough.sample(wo, rng)?,
+            Self::Diffuser(lobe) => lobe.sample(wo, rng)?,
             Self::Lambert(lambert) => lambert.sample(rng),
             Self::Mirror(mirror) => mirror.sample(wo),
-            Self::Interface(interface) => interface.sample(wo, rng),
-            Self::Transparent(color) => BsdfSample { wi: -wo, weight: *color, order: 1 },
-        );
+            Self::Interface(interface) => interface.sample(wo, rng)?,
+            Self::Transparent(color) => BsdfSample {
+                wi: -wo,
+                weight: *color,
+                order: 1,
+            },
+        };
         sample.is_usable().then_some(sample)
     }
 
@@ -118,16 +91,17 @@ impl Closure {
         }
         // Eight walks take less time in lanes than one takes without. GGX gains as much
         // where that is the noise, and loses where it is not: there one is cheap.
-        match self {
-            Self::BeckmannConductor(rough) if rough.is_automatic() => {
+        if let Self::Rough(RoughClosure::Beckmann(ByFacets::Conductor(rough))) = self {
+            if rough.is_automatic() {
                 return rough.eval_eightfold(wo, wi, rng, tally);
             }
-            _ => {}
         }
-        each_rough!(self, rough => rough.eval(wo, wi, rng, tally),
+        match self {
+            Self::Rough(rough) => rough.eval(wo, wi, rng, tally),
+            Self::Diffuser(lobe) => tally.add(1, model::Rgb(lobe.eval(wo, wi).to_array())),
             Self::Lambert(lambert) => tally.add(1, model::Rgb(lambert.eval(wi).to_array())),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => {}
-        );
+        }
     }
 
     /// The closure if it can be evaluated for several directions at once.
@@ -136,9 +110,16 @@ impl Closure {
         if !self.is_in::<F>() {
             return None;
         }
-        match self {
-            Self::GgxConductor(rough) if rough.suits_lanes() => Some(Laned::Ggx(rough)),
-            Self::BeckmannConductor(rough) if rough.suits_lanes() => Some(Laned::Beckmann(rough)),
+        let Self::Rough(rough) = self else {
+            return None;
+        };
+        match rough {
+            RoughClosure::Ggx(ByFacets::Conductor(rough)) if rough.suits_lanes() => {
+                Some(Laned::Ggx(rough))
+            }
+            RoughClosure::Beckmann(ByFacets::Conductor(rough)) if rough.suits_lanes() => {
+                Some(Laned::Beckmann(rough))
+            }
             _ => None,
         }
     }
@@ -150,9 +131,11 @@ impl Closure {
         if !(wo.z > MIN_COS && wi.z.abs() > MIN_COS) {
             return 0.0;
         }
-        each_rough!(self, rough => rough.pdf(wo, wi),
+        match self {
+            Self::Rough(rough) => rough.pdf(wo, wi),
+            Self::Diffuser(lobe) => lobe.pdf(wo, wi),
             Self::Lambert(lambert) => lambert.pdf(wi),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => 0.0,
-        )
+        }
     }
 }

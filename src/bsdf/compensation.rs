@@ -25,9 +25,11 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
+use super::table::with_ndf;
+use super::{Distribution, Width};
 use smithwalk_model::{
-    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Facets, Ggx, Microsurface,
-    Ndf, Rgb, Vector3,
+    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Facets, Ggx, Glass,
+    Microsurface, Ndf, Refraction, Rgb, Vector3,
 };
 
 /// Cosines of a table; odd, for Simpson's rule.
@@ -57,15 +59,6 @@ pub enum WhiteFacets {
     Diffuse,
 }
 
-/// The distribution of their normals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Normals {
-    /// Trowbridge–Reitz.
-    Ggx,
-    /// Gaussian slopes.
-    Beckmann,
-}
-
 /// The albedo of single scattering on white facets, by roughness and angle.
 pub struct Albedos {
     /// Seen from the side that facets have a relative index ≥ 1 from.
@@ -75,25 +68,25 @@ pub struct Albedos {
 }
 
 /// The tables that were asked for so far: few, and needed as long as any scene.
-static TABLES: Mutex<Vec<(Normals, WhiteFacets, &Albedos)>> = Mutex::new(Vec::new());
+static TABLES: Mutex<Vec<(Distribution, WhiteFacets, &Albedos)>> = Mutex::new(Vec::new());
 
 impl Albedos {
     /// The table for these facets, computed when it is first asked for (about a
     /// second of CPU time, two for glass) and kept for the life of the process.
-    pub fn of(normals: Normals, facets: WhiteFacets) -> &'static Self {
+    pub fn of(distribution: Distribution, facets: WhiteFacets) -> &'static Self {
         // Tables are whole or not there: a poisoned lock has lost nothing.
         let mut tables = TABLES.lock().unwrap_or_else(|e| e.into_inner());
         let known = tables
             .iter()
-            .find(|(n, f, _)| (*n, *f) == (normals, facets));
+            .find(|(d, f, _)| (*d, *f) == (distribution, facets));
         if let Some((.., table)) = known {
             return table;
         }
-        let table: &'static Self = Box::leak(Box::new(match normals {
-            Normals::Ggx => Self::compute(Ggx::isotropic, facets),
-            Normals::Beckmann => Self::compute(Beckmann::isotropic, facets),
-        }));
-        tables.push((normals, facets, table));
+        let table: &'static Self = Box::leak(Box::new(with_ndf!(
+            distribution,
+            N => Self::compute(|alpha| <N as Width>::of(alpha, alpha), facets)
+        )));
+        tables.push((distribution, facets, table));
         table
     }
 
@@ -120,6 +113,15 @@ impl Albedos {
                 }
             }
         }
+    }
+
+    /// The factor on single scattering on surfaces of the α `width` that keep the
+    /// share `f` of light at each facet, over that on those that keep all.
+    #[must_use]
+    pub fn darkening(&self, width: f32, cos: f32, f: f32) -> f32 {
+        let (albedo, mean) = self.outer.at(width.sqrt(), cos);
+        let lost = (1.0 - albedo) / albedo;
+        (1.0 + f * mean / (1.0 - f * (1.0 - mean)) * lost) / (1.0 + lost)
     }
 
     /// The factor on single scattering towards a viewer at cosine `cos` from
@@ -183,20 +185,28 @@ impl Grid {
     /// E and Ē, bilinear between the nodes.
     #[inline]
     fn at(&self, roughness: f32, cos: f32) -> (f32, f32) {
-        let split = |at: f32, nodes: usize| {
-            let at = at.clamp(0.0, 1.0) * (nodes - 1) as f32;
-            let node = (at as usize).min(nodes - 2);
-            (node, at - node as f32)
-        };
-        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
         let (i, s) = split(place(roughness) / place(MAX_ROUGHNESS), ROUGHNESSES);
         let (j, t) = split(cos.max(0.0).sqrt(), COSINES);
-        let row = |i: usize| mix(self.albedo[i][j], self.albedo[i][j + 1], t);
+        let row = |i: usize| between(self.albedo[i][j], self.albedo[i][j + 1], t);
         (
-            mix(row(i), row(i + 1), s),
-            mix(self.mean[i], self.mean[i + 1], s),
+            between(row(i), row(i + 1), s),
+            between(self.mean[i], self.mean[i + 1], s),
         )
     }
+}
+
+/// The node below a place `at` from 0 to 1 among evenly spread ones, and how far
+/// it is to the next.
+#[inline]
+pub(super) fn split(at: f32, nodes: usize) -> (usize, f32) {
+    let at = at.clamp(0.0, 1.0) * (nodes - 1) as f32;
+    let node = (at as usize).min(nodes - 2);
+    (node, at - node as f32)
+}
+
+#[inline]
+pub(super) fn between(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
 }
 
 /// Where a roughness is on its axis.
@@ -213,10 +223,7 @@ fn single_albedo<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>>(
 ) -> f32 {
     let wi = Vector3::spherical(cos, 0.0);
     let weight = |index| {
-        let mut point = SobolPoint {
-            index,
-            dimension: 0,
-        };
+        let mut point = SobolPoint::new(index);
         let exit = surface.sample_single(wi, &mut point);
         exit.map_or(0.0, |exit| f64::from(exit.weight.0[0]))
     };
@@ -241,44 +248,24 @@ fn mean_over_hemisphere(row: &[f32; COSINES]) -> f32 {
 }
 
 /// One Owen-scrambled Sobol point, coordinate after coordinate.
-struct SobolPoint {
+pub(super) struct SobolPoint {
     index: u32,
     dimension: u32,
+}
+
+impl SobolPoint {
+    pub(super) fn new(index: u32) -> Self {
+        Self {
+            index,
+            dimension: 0,
+        }
+    }
 }
 
 impl Draw<f32> for SobolPoint {
     fn draw(&mut self) -> f32 {
         self.dimension += 1;
         sobol_burley::sample(self.index, self.dimension - 1, 0)
-    }
-}
-
-/// How wide a distribution of normals is.
-pub trait Width: Ndf<Scalar = f32> {
-    /// The width from which metals are evaluated in lanes.
-    const LANES_FROM: f32;
-
-    /// The α of the isotropic surface that the table is asked for.
-    fn width(&self) -> f32;
-}
-
-impl Width for Ggx<f32> {
-    /// There, all orders always are.
-    const LANES_FROM: f32 = 0.1;
-
-    #[inline]
-    fn width(&self) -> f32 {
-        (self.alpha_x * self.alpha_y).sqrt()
-    }
-}
-
-impl Width for Beckmann<f32> {
-    /// Even the first order alone takes less time in lanes.
-    const LANES_FROM: f32 = 0.0;
-
-    #[inline]
-    fn width(&self) -> f32 {
-        (self.alpha_x * self.alpha_y).sqrt()
     }
 }
 
@@ -307,6 +294,20 @@ impl MeanWeight for Conductor<f32> {
 }
 
 impl MeanWeight for Dielectric<f32> {
+    #[inline]
+    fn mean_weight(&self) -> Rgb<f32> {
+        self.tint
+    }
+}
+
+impl MeanWeight for Glass<f32> {
+    #[inline]
+    fn mean_weight(&self) -> Rgb<f32> {
+        self.transmission
+    }
+}
+
+impl MeanWeight for Refraction<f32> {
     #[inline]
     fn mean_weight(&self) -> Rgb<f32> {
         self.tint
@@ -342,7 +343,7 @@ mod tests {
     /// Mean weight of compensated samples with its standard error, channel by
     /// channel, at a cosine that is on no node.
     fn albedo<N: Width, I: MeanWeight>(
-        normals: Normals,
+        distribution: Distribution,
         white: WhiteFacets,
         surface: Microsurface<N, I>,
         [cos, azimuth]: [f32; 2],
@@ -350,7 +351,7 @@ mod tests {
         const WALKS: u32 = 100_000;
         let rough = Rough {
             surface,
-            method: Method::Compensated(Albedos::of(normals, white)),
+            method: Method::Compensated(Albedos::of(distribution, white)),
         };
         let mut rng = smithwalk_model::Stream(rand_pcg::Pcg64Mcg::seed_from_u64(7));
         let sin = (1.0 - cos * cos).sqrt();
@@ -396,7 +397,7 @@ mod tests {
                 let at_what = format!("√α {roughness}, cos {cos}");
                 macro_rules! each {
                     ($normals:ident, $ndf:expr) => {{
-                        let (normals, ndf) = (Normals::$normals, $ndf);
+                        let (normals, ndf) = (Distribution::$normals, $ndf);
                         let what = |name: &str| format!("{name} {normals:?}, {at_what}");
                         let facets = mirrors(WHITE);
                         let found = albedo(
@@ -447,7 +448,12 @@ mod tests {
                     ndf: Ggx::isotropic(roughness * roughness),
                     facets: mirrors(Rgb([1.0, 0.71, 0.29])),
                 };
-                let (mean, _) = albedo(Normals::Ggx, WhiteFacets::Conductor, surface, [cos, 0.0]);
+                let (mean, _) = albedo(
+                    Distribution::Ggx,
+                    WhiteFacets::Conductor,
+                    surface,
+                    [cos, 0.0],
+                );
                 let off = mean[1] / expected - 1.0;
                 println!(
                     "r {roughness} cos {cos}: {:.4}, Cycles {expected}: {off:+.4}",

@@ -11,7 +11,7 @@ use crate::features::{Features, has};
 use smithwalk_model::{self as model, Draw, LANES, Tally};
 
 /// The most closures that a material may flatten to.
-pub const MAX_CLOSURES: usize = 8;
+pub const MAX_CLOSURES: usize = 16;
 
 /// One closure of the mix, weighted for the viewer's direction.
 #[derive(Clone, Copy, Debug)]

@@ -23,23 +23,31 @@
 //! it. As long as the eye and the lights are in the same medium that is exact,
 //! and it is how Cycles does it.
 
+mod clearcoat;
 mod closure;
 mod compensation;
+mod diffuser;
 mod frame;
 mod interface;
 mod lambert;
 mod mirror;
 mod mixture;
+mod rise;
 mod rough;
+mod table;
 
+pub use clearcoat::Clearcoat;
 pub use closure::Closure;
-pub use compensation::{Albedos, MeanWeight, Normals, WhiteFacets, Width};
+pub use compensation::{Albedos, MeanWeight, WhiteFacets};
+pub use diffuser::{Diffuser, OrenNayar};
 pub use frame::Frame;
 pub use interface::Interface;
 pub use lambert::Lambert;
 pub use mirror::Mirror;
 pub use mixture::{Bsdf, InLanes, MAX_CLOSURES, ScatterSample, WeightedClosure};
+pub use rise::Rises;
 pub use rough::{Method, Rough};
+pub use table::{ByFacets, Distribution, FacetKind, Listed, RoughClosure, Width, WidthInLanes};
 
 use glam::Vec3;
 

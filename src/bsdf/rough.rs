@@ -3,11 +3,11 @@
 use glam::Vec3;
 use wide::f32x8;
 
-use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, to_model};
+use super::{Albedos, BsdfSample, ByOrder, MeanWeight, Width, WidthInLanes, to_model};
 use crate::color::Rgb;
 use crate::features::{Features, has};
 use smithwalk_model::{
-    self as model, Conductor, Draw, Estimator, LANES, Microsurface, NdfInLanes, Tally, Vector3,
+    self as model, Conductor, Draw, Estimator, LANES, Microsurface, Tally, Vector3,
 };
 
 /// How a rough surface's scattering is computed.
@@ -20,6 +20,9 @@ pub enum Method {
     Thinned(Estimator),
     /// The first order alone: what meets a second facet is lost.
     Single,
+    /// The first order with the masking of either direction by itself, G1 G1: what
+    /// Cycles has up to 3.6.
+    Separable,
     /// The first order, scaled to about the albedo that all orders have
     /// together.
     Compensated(&'static Albedos),
@@ -75,6 +78,12 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
         let exit = match self.method {
             Method::Multiple(_) | Method::Thinned(_) => self.surface.sample(to_model(wo), rng),
             Method::Single => self.surface.sample_single(to_model(wo), rng),
+            Method::Separable => {
+                let wo = to_model(wo);
+                let mut exit = self.surface.sample_single(wo, rng)?;
+                exit.weight = exit.weight * self.separation(wo, exit.direction);
+                Some(exit)
+            }
             Method::Compensated(albedos) => {
                 let mut exit = self.surface.sample_single(to_model(wo), rng)?;
                 exit.weight *= albedos.scale(&self.surface, wo.z);
@@ -96,6 +105,10 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
                 self.eval_orders(estimator, chance, wo, wi, rng, tally);
             }
             Method::Single => tally.add(1, self.surface.eval_single(wo, wi, rng)),
+            Method::Separable => {
+                let value = self.surface.eval_single(wo, wi, rng);
+                tally.add(1, value * self.separation(wo, wi));
+            }
             Method::Compensated(albedos) => {
                 let scale = albedos.scale(&self.surface, wo.z);
                 tally.add(1, self.surface.eval_single(wo, wi, rng) * scale);
@@ -166,18 +179,35 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
         faint.clamp(LEAST_CHANCE, 1.0)
     }
 
+    /// Masking and shadowing by themselves over the two together (Heitz 2014,
+    /// "Understanding the Masking-Shadowing Function", eq. 98, 99; by transmission
+    /// the Beta function, Heitz et al. 2016).
+    #[inline]
+    fn separation(&self, wo: Vector3<f32>, wi: Vector3<f32>) -> f32 {
+        let upright = |v: Vector3<f32>| Vector3::new(v.x, v.y, v.z.abs());
+        let [o, i] = [wo, wi].map(|v| 1.0 + self.surface.ndf.lambda(upright(v)));
+        let both = if wi.z < 0.0 {
+            model::ln_beta(o, i).exp()
+        } else {
+            1.0 / (o + i - 1.0)
+        };
+        1.0 / (o * i * both)
+    }
+
     /// The density that stands in for the sampler's, sr⁻¹.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let (wo, wi) = (to_model(wo), to_model(wi));
         match self.method {
             Method::Multiple(_) | Method::Thinned(_) => self.surface.pdf(wo, wi),
-            Method::Single | Method::Compensated(_) => self.surface.pdf_single(wo, wi),
+            Method::Single | Method::Separable | Method::Compensated(_) => {
+                self.surface.pdf_single(wo, wi)
+            }
         }
     }
 }
 
-impl<N: Width + NdfInLanes> Rough<N, Conductor<f32>> {
+impl<N: WidthInLanes> Rough<N, Conductor<f32>> {
     /// Whether [`Self::eval_lanes`] is worth its time. On surfaces that are too smooth
     /// orders above the first are evaluated so rarely that one evaluation is enough.
     #[inline]

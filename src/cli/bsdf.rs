@@ -4,7 +4,6 @@ mod albedo;
 mod eval;
 mod sample;
 
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -12,7 +11,7 @@ use anyhow::ensure;
 use glam::Vec3;
 use smithwalk::color::Rgb;
 use smithwalk::description::{self, Estimator};
-use smithwalk::scene::{Material, Names, compile_material};
+use smithwalk::scene::{Material, compile_alone};
 use smithwalk_model::Stream;
 
 #[derive(clap::Subcommand)]
@@ -51,12 +50,7 @@ struct MaterialArgs {
 impl MaterialArgs {
     fn compile(&self, estimator: Estimator) -> anyhow::Result<Material> {
         let material = description::Material::from_yaml(&self.material)?;
-        let names = Names {
-            materials: &BTreeMap::new(),
-            textures: &BTreeMap::new(),
-            estimator,
-        };
-        let compiled = compile_material(&material, &names)?;
+        let compiled = compile_alone(&material, estimator)?;
         ensure!(!compiled.emits(), "an emissive material does not scatter");
         Ok(compiled)
     }

@@ -1,8 +1,12 @@
 //! Materials.
 
-use super::value::{self, Clash, Color, Scalar};
+use super::principled::{Principled, Version};
+use super::validate::{At, Check, Range};
+use super::value::{Clash, Color, Scalar, visit_numbers};
+pub use crate::bsdf::Distribution;
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde_yaml::with::singleton_map_recursive;
 use std::fmt;
 
 /// How a surface scatters, passes or emits light.
@@ -13,16 +17,28 @@ pub enum Material {
     Conductor(Conductor),
     /// Rough glass.
     Dielectric(Dielectric),
+    /// What rough glass lets through, without Fresnel's factor.
+    Refraction(Dielectric),
     /// Lambertian facets on a rough surface.
     RoughDiffuse(RoughDiffuse),
-    /// Lambert's law.
+    /// Lambert's law, or Oren and Nayar's.
     Diffuse(Diffuse),
+    /// Lambert's law, to the other side.
+    Translucent(Colored),
+    /// Ashikhmin's velvet.
+    Velvet(Velvet),
+    /// Fibres on a surface.
+    Sheen(Sheen),
     /// Shines on both sides.
     Emission(Emission),
     /// Lets light straight through.
-    Transparent(Transparent),
+    Transparent(Colored),
     /// Two materials, blended.
     Mix(Mix),
+    /// Two materials, added.
+    Sum(Sum),
+    /// Blender's node.
+    Principled(Box<Principled>),
 }
 
 /// A rough metal.
@@ -45,21 +61,28 @@ pub enum Reflectance {
     /// A complex index of refraction per channel, η + ik.
     Complex {
         /// The real part.
-        eta: [f32; 3],
+        eta: Color,
         /// The imaginary part, positive for absorption.
-        k: [f32; 3],
+        k: Color,
     },
     /// Schlick's approximation.
     Schlick {
         /// At normal incidence.
-        f0: [f32; 3],
+        f0: Color,
     },
     /// Schlick's approximation corrected near 82°.
     F82 {
         /// At normal incidence.
-        f0: [f32; 3],
+        f0: Color,
+        /// The reflectance at cos θ = 1/7.
+        f82: Color,
+    },
+    /// The same, as Blender's nodes say it.
+    EdgeTint {
+        /// At normal incidence.
+        f0: Color,
         /// The factor on Schlick's value at cos θ = 1/7.
-        f82: [f32; 3],
+        tint: Color,
     },
 }
 
@@ -83,7 +106,7 @@ pub struct Dielectric {
     /// The microsurface.
     pub rough: Rough,
     /// The index of refraction inside over the one outside.
-    pub ior: f32,
+    pub ior: Scalar,
     /// A factor on every reflection and refraction.
     pub color: Color,
 }
@@ -98,18 +121,78 @@ pub struct RoughDiffuse {
     pub color: Color,
 }
 
-/// Lambert's law.
+/// Lambert's law, or Oren and Nayar's.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Diffuse {
     /// The albedo.
     pub color: Color,
+    /// 0 for Lambert's law, up to 1.
+    pub roughness: Scalar,
+    /// Which of Cycles' formulas is meant for rough ones.
+    pub version: Version,
 }
 
 impl Default for Diffuse {
     fn default() -> Self {
         Self {
             color: Color::WHITE,
+            roughness: Scalar::Value(0.0),
+            version: Version::V4_5,
+        }
+    }
+}
+
+/// A material that a colour says all about.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Colored {
+    /// The share of light that it passes on.
+    pub color: Color,
+}
+
+impl Default for Colored {
+    fn default() -> Self {
+        Self {
+            color: Color::WHITE,
+        }
+    }
+}
+
+/// Ashikhmin's velvet.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Velvet {
+    /// A factor on its light.
+    pub color: Color,
+    /// How far fibres lean from the normal, as the tangent of an angle.
+    pub sigma: Scalar,
+}
+
+impl Default for Velvet {
+    fn default() -> Self {
+        Self {
+            color: Color::WHITE,
+            sigma: Scalar::Value(1.0),
+        }
+    }
+}
+
+/// Fibres on a surface.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sheen {
+    /// A factor on its light.
+    pub color: Color,
+    /// How loose the fibres are, 0 to 1.
+    pub roughness: Scalar,
+}
+
+impl Default for Sheen {
+    fn default() -> Self {
+        Self {
+            color: Color::WHITE,
+            roughness: Scalar::Value(0.5),
         }
     }
 }
@@ -121,25 +204,16 @@ pub struct Emission {
     /// Scene-linear Rec. 709.
     pub color: Color,
     /// The factor that makes `color` a radiance in W·m⁻²·sr⁻¹.
-    pub strength: f32,
+    pub strength: Scalar,
 }
 
 impl Default for Emission {
     fn default() -> Self {
         Self {
             color: Color::WHITE,
-            strength: 1.0,
+            strength: Scalar::Value(1.0),
         }
     }
-}
-
-/// Lets light straight through.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Transparent {
-    /// The transmittance.
-    #[serde(default = "value::ones", deserialize_with = "value::triple")]
-    pub color: [f32; 3],
 }
 
 /// Two materials, blended.
@@ -147,16 +221,124 @@ pub struct Transparent {
 #[serde(deny_unknown_fields)]
 pub struct Mix {
     /// The share of `b`, 0 to 1.
-    #[serde(default = "half")]
-    pub factor: Scalar,
+    #[serde(default)]
+    pub factor: Factor,
     /// The first material.
     pub a: MaterialRef,
     /// The second material.
     pub b: MaterialRef,
 }
 
-fn half() -> Scalar {
-    Scalar::Value(0.5)
+/// Two materials, added: nothing keeps what they reflect together below 1.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sum {
+    /// The first material.
+    pub a: MaterialRef,
+    /// The second material.
+    pub b: MaterialRef,
+}
+
+/// The share of the second material of a mix.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Factor {
+    /// A number or a texture.
+    Share(Scalar),
+    /// The reflectance of a smooth interface towards the viewer.
+    Fresnel {
+        /// The index of refraction inside over the one outside.
+        ior: Scalar,
+    },
+    /// How far the surface is turned away from the viewer.
+    Facing {
+        /// 0 to 1; at one half, 1 − cosθ.
+        blend: Scalar,
+    },
+    /// 1 seen from inside.
+    Backfacing,
+    /// 1 for camera rays.
+    CameraRay,
+}
+
+impl Default for Factor {
+    fn default() -> Self {
+        Self::Share(Scalar::Value(0.5))
+    }
+}
+
+impl<'de> Deserialize<'de> for Factor {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum ByView {
+            Fresnel(Fresnel),
+            Facing(Facing),
+            Backfacing,
+            CameraRay,
+        }
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Fresnel {
+            #[serde(default = "ior")]
+            ior: Scalar,
+        }
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Facing {
+            #[serde(default = "half")]
+            blend: Scalar,
+        }
+        fn ior() -> Scalar {
+            Scalar::Value(1.45)
+        }
+        fn half() -> Scalar {
+            Scalar::Value(0.5)
+        }
+
+        impl From<ByView> for Factor {
+            fn from(by_view: ByView) -> Self {
+                match by_view {
+                    ByView::Fresnel(Fresnel { ior }) => Self::Fresnel { ior },
+                    ByView::Facing(Facing { blend }) => Self::Facing { blend },
+                    ByView::Backfacing => Self::Backfacing,
+                    ByView::CameraRay => Self::CameraRay,
+                }
+            }
+        }
+
+        struct FactorVisitor;
+
+        impl<'de> Visitor<'de> for FactorVisitor {
+            type Value = Factor;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str(
+                    "a number, {texture: NAME}, {fresnel: {ior: 1.45}}, {facing: {blend: 0.5}}, backfacing or camera_ray",
+                )
+            }
+
+            visit_numbers!(Factor, n => Factor::Share(Scalar::Value(n as f32)));
+
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<Factor, E> {
+                ByView::deserialize(de::value::StrDeserializer::new(name)).map(Factor::from)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Factor, A::Error> {
+                let value = serde_yaml::Value::deserialize(MapAccessDeserializer::new(map))?;
+                let textured = value.get("texture").is_some() || value.get("channel").is_some();
+                let read = |value| {
+                    if textured {
+                        Scalar::deserialize(value).map(Factor::Share)
+                    } else {
+                        singleton_map_recursive::deserialize::<ByView, _>(value).map(Factor::from)
+                    }
+                };
+                read(value).map_err(de::Error::custom)
+            }
+        }
+
+        deserializer.deserialize_any(FactorVisitor)
+    }
 }
 
 /// A material by name, or written in place.
@@ -236,17 +418,6 @@ pub enum Roughness {
     },
 }
 
-/// A distribution of microfacet normals.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Distribution {
-    /// Trowbridge and Reitz's.
-    #[default]
-    Ggx,
-    /// Beckmann and Spizzichino's.
-    Beckmann,
-}
-
 /// Whether light that meets the microsurface again is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -282,7 +453,7 @@ pub enum Axis {
 /// Declares the keys of a rough material beside those that all share: serde's
 /// `flatten` would lose both unknown keys and the place of errors.
 macro_rules! raw_rough {
-    ($($raw:ident { $($(#[$attribute:meta])* $key:ident: $type:ty,)* })*) => {
+    ($($raw:ident { $($key:ident: $type:ty,)* })*) => {
         $(
             #[derive(Deserialize)]
             #[serde(deny_unknown_fields)]
@@ -299,7 +470,7 @@ macro_rules! raw_rough {
                 rotation: Option<Scalar>,
                 #[serde(default)]
                 tangent: Tangent,
-                $($(#[$attribute])* $key: $type,)*
+                $($key: $type,)*
             }
 
             impl $raw {
@@ -322,17 +493,14 @@ raw_rough! {
     RawConductor {
         color: Option<Color>,
         metal: Option<Metal>,
-        #[serde(default, deserialize_with = "value::optional_triple")]
-        eta: Option<[f32; 3]>,
-        #[serde(default, deserialize_with = "value::optional_triple")]
-        k: Option<[f32; 3]>,
-        #[serde(default, deserialize_with = "value::optional_triple")]
-        f0: Option<[f32; 3]>,
-        #[serde(default, deserialize_with = "value::optional_triple")]
-        f82: Option<[f32; 3]>,
+        eta: Option<Color>,
+        k: Option<Color>,
+        f0: Option<Color>,
+        f82: Option<Color>,
+        edge_tint: Option<Color>,
     }
     RawDielectric {
-        ior: Option<f32>,
+        ior: Option<Scalar>,
         color: Option<Color>,
     }
     RawRoughDiffuse {
@@ -376,7 +544,10 @@ impl TryFrom<RawConductor> for Conductor {
             ("color", raw.color.is_some()),
             ("metal", raw.metal.is_some()),
             ("eta", raw.eta.is_some() || raw.k.is_some()),
-            ("f0", raw.f0.is_some() || raw.f82.is_some()),
+            (
+                "f0",
+                raw.f0.is_some() || raw.f82.is_some() || raw.edge_tint.is_some(),
+            ),
         ]
         .into_iter()
         .filter_map(|(key, given)| given.then_some(key))
@@ -385,9 +556,15 @@ impl TryFrom<RawConductor> for Conductor {
             return Err(Clash::new(
                 second,
                 format!(
-                    "`{first}` and `{second}` exclude each other: a conductor takes one of `color`, `metal`, `eta` and `k`, `f0`, or `f0` and `f82`"
+                    "`{first}` and `{second}` exclude each other: a conductor takes one of `color`, `metal`, `eta` and `k`, `f0`, `f0` and `f82`, or `f0` and `edge_tint`"
                 ),
             ));
+        }
+        if raw.f82.is_some() && raw.edge_tint.is_some() {
+            return Err(Clash::between("f82", "edge_tint"));
+        }
+        if raw.edge_tint.is_some() && raw.f0.is_none() {
+            return Err(Clash::new("edge_tint", "`edge_tint` needs `f0`"));
         }
         let reflectance = match (raw.metal, raw.eta, raw.k, raw.f0, raw.f82) {
             (Some(metal), ..) => Reflectance::Metal(metal),
@@ -395,7 +572,10 @@ impl TryFrom<RawConductor> for Conductor {
             (_, Some(_), None, ..) => return Err(Clash::new("eta", "`eta` needs `k`")),
             (_, None, Some(_), ..) => return Err(Clash::new("k", "`k` needs `eta`")),
             (.., Some(f0), Some(f82)) => Reflectance::F82 { f0, f82 },
-            (.., Some(f0), None) => Reflectance::Schlick { f0 },
+            (.., Some(f0), None) => match raw.edge_tint {
+                Some(tint) => Reflectance::EdgeTint { f0, tint },
+                None => Reflectance::Schlick { f0 },
+            },
             (.., None, Some(_)) => return Err(Clash::new("f82", "`f82` needs `f0`")),
             (.., None, None) => Reflectance::Color(raw.color.unwrap_or(Color::WHITE)),
         };
@@ -409,7 +589,7 @@ impl TryFrom<RawDielectric> for Dielectric {
     fn try_from(mut raw: RawDielectric) -> Result<Self, Clash> {
         Ok(Self {
             rough: raw.rough()?,
-            ior: raw.ior.unwrap_or(1.5),
+            ior: raw.ior.unwrap_or(Scalar::Value(1.5)),
             color: raw.color.unwrap_or(Color::WHITE),
         })
     }
@@ -423,5 +603,145 @@ impl TryFrom<RawRoughDiffuse> for RoughDiffuse {
             rough: raw.rough()?,
             color: raw.color.unwrap_or(Color::WHITE),
         })
+    }
+}
+
+impl Material {
+    /// Reports values out of range and names that lead nowhere.
+    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: At) {
+        match self {
+            Self::Conductor(conductor) => conductor.check(check, at.key("conductor")),
+            Self::Dielectric(glass) => glass.check(check, at.key("dielectric")),
+            Self::Refraction(glass) => glass.check(check, at.key("refraction")),
+            Self::RoughDiffuse(matte) => {
+                let at = at.key("rough_diffuse");
+                matte.rough.check(check, &at);
+                check.color(&matte.color, Range::UNIT, at.key("color"));
+            }
+            Self::Diffuse(diffuse) => {
+                let at = at.key("diffuse");
+                check.color(&diffuse.color, Range::UNIT, at.key("color"));
+                check.scalar(&diffuse.roughness, Range::UNIT, at.key("roughness"));
+            }
+            Self::Translucent(part) => {
+                check.color(&part.color, Range::UNIT, at.key("translucent").key("color"));
+            }
+            Self::Transparent(part) => {
+                check.color(&part.color, Range::UNIT, at.key("transparent").key("color"));
+            }
+            Self::Velvet(velvet) => {
+                let at = at.key("velvet");
+                check.color(&velvet.color, Range::UNIT, at.key("color"));
+                check.scalar(&velvet.sigma, Range::NonNegative, at.key("sigma"));
+            }
+            Self::Sheen(sheen) => {
+                let at = at.key("sheen");
+                check.color(&sheen.color, Range::UNIT, at.key("color"));
+                check.scalar(&sheen.roughness, Range::UNIT, at.key("roughness"));
+            }
+            Self::Emission(emission) => {
+                let at = at.key("emission");
+                check.color(&emission.color, Range::NonNegative, at.key("color"));
+                check.scalar(&emission.strength, Range::NonNegative, at.key("strength"));
+            }
+            Self::Mix(mix) => {
+                let at = at.key("mix");
+                let factor = at.key("factor");
+                match &mix.factor {
+                    Factor::Share(share) => check.scalar(share, Range::UNIT, factor),
+                    Factor::Fresnel { ior } => {
+                        check.scalar(ior, Range::Positive, factor.key("fresnel").key("ior"));
+                    }
+                    Factor::Facing { blend } => {
+                        check.scalar(blend, Range::UNIT, factor.key("facing").key("blend"));
+                    }
+                    Factor::Backfacing | Factor::CameraRay => {}
+                }
+                mix.a.check(check, at.key("a"));
+                mix.b.check(check, at.key("b"));
+            }
+            Self::Sum(sum) => {
+                let at = at.key("sum");
+                sum.a.check(check, at.key("a"));
+                sum.b.check(check, at.key("b"));
+            }
+            Self::Principled(principled) => principled.check(check, &at.key("principled")),
+        }
+    }
+
+    /// The materials that it is made of.
+    pub(crate) fn parts(&self) -> Option<[&MaterialRef; 2]> {
+        match self {
+            Self::Mix(Mix { a, b, .. }) | Self::Sum(Sum { a, b }) => Some([a, b]),
+            _ => None,
+        }
+    }
+}
+
+impl MaterialRef {
+    fn check(&self, check: &mut Check<'_, '_>, at: At) {
+        match self {
+            Self::Name(name) => check.reference("materials", "material", name, at),
+            Self::Inline(material) => material.check(check, at),
+        }
+    }
+}
+
+impl Conductor {
+    fn check(&self, check: &mut Check<'_, '_>, at: At) {
+        self.rough.check(check, &at);
+        match &self.reflectance {
+            Reflectance::Color(color) => check.color(color, Range::UNIT, at.key("color")),
+            Reflectance::Metal(_) => {}
+            Reflectance::Complex { eta, k } => {
+                check.color(eta, Range::Positive, at.key("eta"));
+                check.color(k, Range::NonNegative, at.key("k"));
+            }
+            Reflectance::Schlick { f0 } => check.color(f0, Range::UNIT, at.key("f0")),
+            Reflectance::F82 { f0, f82 } => {
+                check.color(f0, Range::UNIT, at.key("f0"));
+                check.color(f82, Range::UNIT, at.key("f82"));
+            }
+            Reflectance::EdgeTint { f0, tint } => {
+                check.color(f0, Range::UNIT, at.key("f0"));
+                check.color(tint, Range::UNIT, at.key("edge_tint"));
+            }
+        }
+    }
+}
+
+impl Dielectric {
+    fn check(&self, check: &mut Check<'_, '_>, at: At) {
+        self.rough.check(check, &at);
+        check.scalar(&self.ior, Range::Positive, at.key("ior"));
+        check.color(&self.color, Range::UNIT, at.key("color"));
+    }
+}
+
+impl Rough {
+    fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+        match &self.roughness {
+            Roughness::Alpha(alpha) => check.scalar(alpha, Range::NonNegative, at.key("alpha")),
+            Roughness::AlphaXy { x, y } => {
+                check.scalar(x, Range::NonNegative, at.key("alpha_x"));
+                check.scalar(y, Range::NonNegative, at.key("alpha_y"));
+                if let (Scalar::Value(x), Scalar::Value(y)) = (x, y) {
+                    if (*x == 0.0) != (*y == 0.0) {
+                        check.report(
+                            at.key("alpha_y"),
+                            "expected `alpha_x` and `alpha_y` both 0 or both above 0".to_owned(),
+                        );
+                    }
+                }
+            }
+            Roughness::Blender {
+                roughness,
+                anisotropy,
+            } => {
+                check.scalar(roughness, Range::UNIT, at.key("roughness"));
+                check.scalar(anisotropy, Range::Within(-1.0, 1.0), at.key("anisotropy"));
+            }
+        }
+        check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
     }
 }

@@ -60,8 +60,7 @@ fn depth<'a>(
 }
 
 fn mixed_names<'a>(material: &'a Material, names: &mut Vec<&'a str>) {
-    let Material::Mix(mix) = material else { return };
-    for part in [&mix.a, &mix.b] {
+    for part in material.parts().into_iter().flatten() {
         match part {
             MaterialRef::Name(name) => names.push(name),
             MaterialRef::Inline(material) => mixed_names(material, names),

@@ -10,6 +10,7 @@ mod material;
 mod mixes;
 mod node;
 mod overrides;
+mod principled;
 mod problem;
 mod read;
 mod settings;
@@ -23,9 +24,11 @@ pub use camera::{
 };
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
-    Axis, Conductor, Dielectric, Diffuse, Distribution, Emission, Material, MaterialRef, Metal,
-    Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Tangent, Transparent,
+    Axis, Colored, Conductor, Dielectric, Diffuse, Distribution, Emission, Factor, Material,
+    MaterialRef, Metal, Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Sheen, Sum,
+    Tangent, Velvet,
 };
+pub use principled::{Principled, Principled3, Principled4, Sockets, Version};
 pub use problem::{Problem, Problems};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;

@@ -4,9 +4,8 @@ use super::document::{Node, Step, dotted};
 use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
-    Aperture, AreaShape, Assignment, Camera, Color, Conductor, Description, Film, Filter, Light,
-    LightKind, Material, MaterialRef, Object, Opening, Projection, Reflectance, Rough, Roughness,
-    Sampling, Scalar, Texture, Transform, World,
+    Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
+    Material, Object, Opening, Projection, Sampling, Scalar, Texture, Transform, World,
 };
 use crate::text::excerpt;
 use std::collections::BTreeSet;
@@ -40,7 +39,7 @@ pub(super) fn description(description: &Description, tree: &Node, sources: &mut 
         check.texture(texture, root.key("textures").key(name));
     }
     for (name, material) in &description.materials {
-        check.material(material, root.key("materials").key(name));
+        material.check(&mut check, root.key("materials").key(name));
     }
     check.mixes(description);
     for (index, object) in description.objects.iter().enumerate() {
@@ -53,24 +52,24 @@ pub(super) fn description(description: &Description, tree: &Node, sources: &mut 
 
 /// Checks a material that stands alone.
 pub(super) fn material(material: &Material, tree: &Node, sources: &mut Sources) {
-    Check {
+    let mut check = Check {
         tree,
         sources,
         in_scene: false,
-    }
-    .material(material, At::root());
+    };
+    material.check(&mut check, At::root());
 }
 
 /// A path into the tree as it was deserialised.
 #[derive(Clone)]
-struct At(Vec<Step>);
+pub(super) struct At(Vec<Step>);
 
 impl At {
     fn root() -> Self {
         Self(Vec::new())
     }
 
-    fn key(&self, key: &str) -> Self {
+    pub(super) fn key(&self, key: &str) -> Self {
         Self([&self.0[..], &[Step::Key(key.to_owned())]].concat())
     }
 
@@ -81,7 +80,7 @@ impl At {
 
 /// The values a number may have.
 #[derive(Clone, Copy)]
-enum Range {
+pub(super) enum Range {
     Positive,
     NonNegative,
     /// Both ends included.
@@ -93,7 +92,7 @@ enum Range {
 }
 
 impl Range {
-    const UNIT: Self = Self::Within(0.0, 1.0);
+    pub(super) const UNIT: Self = Self::Within(0.0, 1.0);
 
     fn contains(self, value: f32) -> bool {
         match self {
@@ -124,7 +123,7 @@ enum Use {
     Direction,
 }
 
-struct Check<'a, 's> {
+pub(super) struct Check<'a, 's> {
     tree: &'a Node,
     sources: &'a mut Sources<'s>,
     /// Whether there are materials and textures to name.
@@ -132,7 +131,7 @@ struct Check<'a, 's> {
 }
 
 impl Check<'_, '_> {
-    fn report(&mut self, at: At, message: String) {
+    pub(super) fn report(&mut self, at: At, message: String) {
         self.report_near(at, message, None);
     }
 
@@ -149,7 +148,7 @@ impl Check<'_, '_> {
         }
     }
 
-    fn scalar(&mut self, scalar: &Scalar, range: Range, at: At) {
+    pub(super) fn scalar(&mut self, scalar: &Scalar, range: Range, at: At) {
         match scalar {
             Scalar::Value(value) => self.number(*value, range, at),
             Scalar::Texture { name, .. } => {
@@ -168,7 +167,7 @@ impl Check<'_, '_> {
         }
     }
 
-    fn color(&mut self, color: &Color, range: Range, at: At) {
+    pub(super) fn color(&mut self, color: &Color, range: Range, at: At) {
         match color {
             Color::Value(channels) => self.triple(*channels, range, at),
             Color::Texture(name) => self.reference("textures", "texture", name, at.key("texture")),
@@ -176,7 +175,7 @@ impl Check<'_, '_> {
     }
 
     /// Names of faulty things are known, too: the fault is enough to report.
-    fn reference(&mut self, section: &str, what: &str, name: &str, at: At) {
+    pub(super) fn reference(&mut self, section: &str, what: &str, name: &str, at: At) {
         if !self.in_scene {
             self.report(
                 at,
@@ -384,101 +383,6 @@ impl Check<'_, '_> {
     fn texture(&mut self, texture: &Texture, at: At) {
         if texture.scale.contains(&0.0) {
             self.report(at.key("scale"), "expected factors other than 0".to_owned());
-        }
-    }
-
-    fn material(&mut self, material: &Material, at: At) {
-        match material {
-            Material::Conductor(conductor) => self.conductor(conductor, at.key("conductor")),
-            Material::Dielectric(dielectric) => {
-                let at = at.key("dielectric");
-                self.rough(&dielectric.rough, &at);
-                self.number(dielectric.ior, Range::Positive, at.key("ior"));
-                self.color(&dielectric.color, Range::UNIT, at.key("color"));
-            }
-            Material::RoughDiffuse(diffuse) => {
-                let at = at.key("rough_diffuse");
-                self.rough(&diffuse.rough, &at);
-                self.color(&diffuse.color, Range::UNIT, at.key("color"));
-            }
-            Material::Diffuse(diffuse) => {
-                self.color(&diffuse.color, Range::UNIT, at.key("diffuse").key("color"))
-            }
-            Material::Emission(emission) => {
-                let at = at.key("emission");
-                self.color(&emission.color, Range::NonNegative, at.key("color"));
-                self.number(emission.strength, Range::NonNegative, at.key("strength"));
-            }
-            Material::Transparent(transparent) => {
-                self.triple(
-                    transparent.color,
-                    Range::UNIT,
-                    at.key("transparent").key("color"),
-                );
-            }
-            Material::Mix(mix) => {
-                let at = at.key("mix");
-                self.scalar(&mix.factor, Range::UNIT, at.key("factor"));
-                for (key, part) in [("a", &mix.a), ("b", &mix.b)] {
-                    match part {
-                        MaterialRef::Name(name) => {
-                            self.reference("materials", "material", name, at.key(key))
-                        }
-                        MaterialRef::Inline(material) => self.material(material, at.key(key)),
-                    }
-                }
-            }
-        }
-    }
-
-    fn conductor(&mut self, conductor: &Conductor, at: At) {
-        self.rough(&conductor.rough, &at);
-        match &conductor.reflectance {
-            Reflectance::Color(color) => self.color(color, Range::UNIT, at.key("color")),
-            Reflectance::Metal(_) => {}
-            Reflectance::Complex { eta, k } => {
-                self.triple(*eta, Range::Positive, at.key("eta"));
-                self.triple(*k, Range::NonNegative, at.key("k"));
-            }
-            Reflectance::Schlick { f0 } => self.triple(*f0, Range::UNIT, at.key("f0")),
-            Reflectance::F82 { f0, f82 } => {
-                self.triple(*f0, Range::UNIT, at.key("f0"));
-                self.triple(*f82, Range::UNIT, at.key("f82"));
-            }
-        }
-    }
-
-    fn rough(&mut self, rough: &Rough, at: &At) {
-        match &rough.roughness {
-            Roughness::Alpha(alpha) => self.scalar(alpha, Range::NonNegative, at.key("alpha")),
-            Roughness::AlphaXy { x, y } => {
-                self.scalar(x, Range::NonNegative, at.key("alpha_x"));
-                self.scalar(y, Range::NonNegative, at.key("alpha_y"));
-                self.smooth_in_one_direction(x, y, at.key("alpha_y"));
-            }
-            Roughness::Blender {
-                roughness,
-                anisotropy,
-            } => {
-                self.scalar(roughness, Range::UNIT, at.key("roughness"));
-                self.scalar(anisotropy, Range::Within(-1.0, 1.0), at.key("anisotropy"));
-            }
-        }
-        self.scalar(
-            &rough.rotation,
-            Range::Within(-1.0, 1.0),
-            at.key("rotation"),
-        );
-    }
-
-    fn smooth_in_one_direction(&mut self, x: &Scalar, y: &Scalar, at: At) {
-        if let (Scalar::Value(x), Scalar::Value(y)) = (x, y) {
-            if (*x == 0.0) != (*y == 0.0) {
-                self.report(
-                    at,
-                    "expected `alpha_x` and `alpha_y` both 0 or both above 0".to_owned(),
-                );
-            }
         }
     }
 

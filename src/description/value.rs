@@ -120,6 +120,8 @@ macro_rules! visit_numbers {
     };
 }
 
+pub(super) use visit_numbers;
+
 struct TripleVisitor;
 
 impl<'de> Visitor<'de> for TripleVisitor {

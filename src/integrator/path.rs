@@ -280,13 +280,12 @@ impl<'a, const F: u32> PathTracer<'a, F> {
                 continue;
             }
             if has::<F>(Features::EMISSIVE_MESHES) {
-                emitted += self.surface_emission(&surface, &path.last);
+                emitted += self.surface_emission(&surface, path.view(), &path.last);
             }
             path.deposit(&mut result.radiance, emitted);
             if self.describe_first && camera && result.first.is_none() {
-                let material = &self.scene.materials[surface.material];
                 result.first = Some(FirstHit {
-                    albedo: material.albedo(&self.scene.textures, surface.uv),
+                    albedo: self.scene.albedo(&surface, path.view()),
                     normal: surface.normal,
                     distance: path.last.travelled + hit.t,
                 });
@@ -468,11 +467,11 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         }
     }
 
-    fn surface_emission(&self, surface: &Surface, last: &Vertex) -> Rgb {
+    fn surface_emission(&self, surface: &Surface, view: View, last: &Vertex) -> Rgb {
         let Some(first) = self.scene.objects[surface.object].first_emitter else {
             return Rgb::ZERO;
         };
-        let radiance = self.scene.emission(surface);
+        let radiance = self.scene.emission(surface, view);
         if radiance == Rgb::ZERO {
             return Rgb::ZERO;
         }
@@ -545,9 +544,11 @@ impl<'a, const F: u32> PathTracer<'a, F> {
         if has::<F>(Features::EMISSIVE_MESHES) {
             if let Some((EmitterId(emitter), barycentric)) = light.emitter {
                 ray.t_far *= SHORT_OF_EMITTER;
-                // Without textures the sample's own radiance is exact.
-                if has::<F>(Features::TEXTURES) {
-                    radiance = self.scene.emission_at(emitter, barycentric);
+                // Where all points shine alike the sample's own radiance is exact.
+                if has::<F>(Features::TEXTURES) || has::<F>(Features::VIEW_DEPENDENT) {
+                    radiance = self
+                        .scene
+                        .emission_at(emitter, barycentric, -light.direction);
                 }
             }
         }

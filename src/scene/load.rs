@@ -1,14 +1,12 @@
 //! Files that a description names, read in parallel, all errors together.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::compile::Materials;
 use super::resolve::ResolveError;
-use crate::description::{
-    Assignment, Color, Description, Material, MaterialRef, Object, Reflectance, Rough, Roughness,
-    Scalar, Tangent, World,
-};
+use crate::description::{Assignment, Description, Object, World};
 use crate::memory::Budget;
 use crate::mesh::{Mesh, Wanted};
 use crate::texture::{EnvironmentImage, Images, Texture, load_environment};
@@ -28,12 +26,17 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// Reads what the description's objects and world need, and nothing else.
+    /// Reads what the description's objects and world need, and nothing else; the
+    /// materials that objects may have are compiled for that.
     ///
     /// # Errors
     /// Everything that could not be read, or for which the budget has no room.
-    pub fn load(description: &Description, budget: &Budget) -> Result<Self, ResolveError> {
-        let used = Used::by(description);
+    pub fn load(
+        description: &Description,
+        materials: &mut Materials<'_>,
+        budget: &Budget,
+    ) -> Result<Self, ResolveError> {
+        let used = Used::by(description, materials);
         let meshes: Vec<_> = used
             .meshes
             .par_iter()
@@ -50,8 +53,8 @@ impl Assets {
             })
             .collect();
         let images = Images::new(budget);
-        let textures: Vec<_> = used
-            .textures
+        let textures: Vec<_> = materials
+            .textures()
             .par_iter()
             .filter_map(|name| {
                 let texture = description.textures.get(name)?;
@@ -123,23 +126,19 @@ impl Assets {
 struct Used {
     /// Mesh names, and whether their texture coordinates are looked at.
     meshes: BTreeMap<String, bool>,
-    textures: BTreeSet<String>,
 }
 
 impl Used {
-    fn by(description: &Description) -> Self {
+    fn by(description: &Description, materials: &mut Materials<'_>) -> Self {
         let mut used = Self::default();
         for object in &description.objects {
-            let mut visit = Visit {
-                description,
-                textures: BTreeSet::new(),
-                uvs: false,
-            };
-            for material in materials_of(object, description) {
-                visit.material(material);
+            let mut uvs = false;
+            for name in materials_of(object, materials) {
+                // What is wrong with it is told when an object turns out to have it.
+                if let Some(Ok(compiled)) = materials.get(&name) {
+                    uvs |= compiled.needs.uvs;
+                }
             }
-            let uvs = visit.uvs || !visit.textures.is_empty();
-            used.textures.append(&mut visit.textures);
             *used.meshes.entry(object.mesh.clone()).or_default() |= uvs;
         }
         used
@@ -148,92 +147,10 @@ impl Used {
 
 /// The materials an object may turn out to have. Slots are known only once the
 /// mesh is read, so an object that takes them from there may have any.
-fn materials_of<'a>(object: &'a Object, description: &'a Description) -> Vec<&'a Material> {
+fn materials_of(object: &Object, materials: &Materials<'_>) -> Vec<String> {
     match &object.materials {
-        Assignment::All(name) => description.materials.get(name).into_iter().collect(),
-        Assignment::BySlot(slots) => slots
-            .values()
-            .filter_map(|name| description.materials.get(name))
-            .collect(),
-        Assignment::FromMesh => description.materials.values().collect(),
-    }
-}
-
-struct Visit<'a> {
-    description: &'a Description,
-    textures: BTreeSet<String>,
-    uvs: bool,
-}
-
-impl Visit<'_> {
-    fn material(&mut self, material: &Material) {
-        match material {
-            Material::Conductor(conductor) => {
-                self.rough(&conductor.rough);
-                if let Reflectance::Color(color) = &conductor.reflectance {
-                    self.color(color);
-                }
-            }
-            Material::Dielectric(glass) => {
-                self.rough(&glass.rough);
-                self.color(&glass.color);
-            }
-            Material::RoughDiffuse(matte) => {
-                self.rough(&matte.rough);
-                self.color(&matte.color);
-            }
-            Material::Diffuse(diffuse) => self.color(&diffuse.color),
-            Material::Emission(emission) => self.color(&emission.color),
-            Material::Transparent(_) => {}
-            Material::Mix(mix) => {
-                self.scalar(&mix.factor);
-                for child in [&mix.a, &mix.b] {
-                    match child {
-                        MaterialRef::Inline(material) => self.material(material),
-                        MaterialRef::Name(name) => {
-                            if let Some(material) = self.description.materials.get(name) {
-                                self.material(material);
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn rough(&mut self, rough: &Rough) {
-        self.scalar(&rough.rotation);
-        let isotropic = match &rough.roughness {
-            Roughness::Alpha(alpha) => {
-                self.scalar(alpha);
-                true
-            }
-            Roughness::AlphaXy { x, y } => {
-                self.scalar(x);
-                self.scalar(y);
-                x == y
-            }
-            Roughness::Blender {
-                roughness,
-                anisotropy,
-            } => {
-                self.scalar(roughness);
-                self.scalar(anisotropy);
-                *anisotropy == Scalar::Value(0.0)
-            }
-        };
-        self.uvs |= !isotropic && rough.tangent == Tangent::Uv;
-    }
-
-    fn scalar(&mut self, scalar: &Scalar) {
-        if let Scalar::Texture { name, .. } = scalar {
-            self.textures.insert(name.clone());
-        }
-    }
-
-    fn color(&mut self, color: &Color) {
-        if let Color::Texture(name) = color {
-            self.textures.insert(name.clone());
-        }
+        Assignment::All(name) => vec![name.clone()],
+        Assignment::BySlot(slots) => slots.values().cloned().collect(),
+        Assignment::FromMesh => materials.names().map(str::to_owned).collect(),
     }
 }

@@ -1,20 +1,20 @@
 //! The scene as it is rendered: immutable, indices for names, radiometric
 //! quantities for the file's units, nothing that no ray asks for.
 
+mod compile;
 mod load;
 mod material;
-mod materials;
 mod resolve;
 mod settings;
 mod surface;
 mod transform;
 
+pub use compile::{Compiled, MaterialError, Materials, Needs, compile_alone};
 pub use load::Assets;
 pub use material::{
-    Distribution, Facet, Leaf, Material, Number, RoughMaterial, Roughness, Tangent, Tint,
-    WeightedLeaf, blender_alphas,
+    Facet, Factor, Leaf, Material, Number, Point, Reflectance, RoughMaterial, Roughness, Tangent,
+    Tint, WeightedLeaf, blender_alphas,
 };
-pub use materials::{MaterialError, Names, compile_material};
 pub use resolve::{ResolveError, Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
 pub use surface::{Surface, View};
@@ -216,11 +216,11 @@ impl Scene {
         self.materials[surface.material].bsdf(&self.textures, surface, view)
     }
 
-    /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle, given the
-    /// triangle's number among those of all objects and barycentric weights of
-    /// its second and third corner.
+    /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle towards `wo`,
+    /// given the triangle's number among those of all objects and barycentric
+    /// weights of its second and third corner.
     #[must_use]
-    pub fn emission_at(&self, emitter: u32, [u, v]: [f32; 2]) -> Rgb {
+    pub fn emission_at(&self, emitter: u32, [u, v]: [f32; 2], wo: Vec3) -> Rgb {
         let object = &self.objects[self.emitters[emitter as usize] as usize];
         let Some(first) = object.first_emitter else {
             return Rgb::ZERO;
@@ -231,18 +231,44 @@ impl Scene {
             .slots
             .as_ref()
             .map_or(0, |slots| slots[triangle] as usize);
+        let corners = mesh.triangles[triangle].map(|i| i as usize);
         let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
-            let [a, b, c] = mesh.triangles[triangle].map(|i| Vec2::from(uvs[i as usize]));
+            let [a, b, c] = corners.map(|i| Vec2::from(uvs[i]));
             a * (1.0 - u - v) + b * u + c * v
         });
-        self.materials[object.materials[slot]].emission(&self.textures, uv)
+        let [a, b, c] = corners.map(|i| {
+            let p = Vec3A::from(mesh.vertices[i]);
+            object
+                .to_world
+                .map_or(p, |to_world| to_world.transform_point3a(p))
+        });
+        let cross = Vec3::from((b - a).cross(c - a));
+        let outward = if object.mirrored { -cross } else { cross };
+        let cos = outward.normalize_or_zero().dot(wo);
+        let point = Point {
+            textures: &self.textures,
+            uv,
+            cos: cos.abs(),
+            front: cos >= 0.0,
+            camera: false,
+        };
+        self.materials[object.materials[slot]].emission(&point)
     }
 
     /// The radiance that a surface point sends towards the viewer by itself,
     /// W·m⁻²·sr⁻¹.
     #[must_use]
-    pub fn emission(&self, surface: &Surface) -> Rgb {
-        self.materials[surface.material].emission(&self.textures, surface.uv)
+    pub fn emission(&self, surface: &Surface, view: View) -> Rgb {
+        let point = Point::shining(&self.textures, surface, view);
+        self.materials[surface.material].emission(&point)
+    }
+
+    /// What a noise filter takes for the albedo of a surface point, see
+    /// [`Material::albedo`].
+    #[must_use]
+    pub fn albedo(&self, surface: &Surface, view: View) -> Rgb {
+        let point = Point::shaded(&self.textures, surface, view);
+        self.materials[surface.material].albedo(&point)
     }
 }
 

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
+use super::compile::Materials;
 use super::load::Assets;
-use super::materials::{Names, compile_material};
 use super::transform::to_affine;
-use super::{Leaf, Material, Number, Object, RenderSettings, Roughness, Scene, SceneMesh, Tangent};
+use super::{Material, Object, RenderSettings, Scene, SceneMesh};
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::description::{Assignment, Description, Transform};
@@ -17,7 +17,6 @@ use crate::features::Features;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::memory::Budget;
 use crate::mesh::Mesh;
-use crate::scene::material::{Distribution, Facet, Tint};
 use crate::texture::Texture;
 
 /// Everything that keeps a scene from being rendered, a line or more each.
@@ -62,7 +61,9 @@ pub fn resolve_within(
     description: &Description,
     budget: &Budget,
 ) -> Result<Resolved, ResolveError> {
-    assemble(description, Assets::load(description, budget)?, budget)
+    let mut materials = Materials::of(description);
+    let assets = Assets::load(description, &mut materials, budget)?;
+    build(description, assets, materials, budget)
 }
 
 /// Builds the scene from a description and the contents of its files.
@@ -74,17 +75,24 @@ pub fn assemble(
     assets: Assets,
     budget: &Budget,
 ) -> Result<Resolved, ResolveError> {
+    build(description, assets, Materials::of(description), budget)
+}
+
+fn build(
+    description: &Description,
+    assets: Assets,
+    materials: Materials<'_>,
+    budget: &Budget,
+) -> Result<Resolved, ResolveError> {
     let mut problems = Vec::new();
     let Assets {
         meshes,
-        textures,
+        textures: mut loaded,
         environment,
-        repairs,
+        mut repairs,
     } = assets;
 
-    let texture_index: BTreeMap<String, usize> = textures.keys().cloned().zip(0..).collect();
-    let textures: Vec<Texture> = textures.into_values().collect();
-    let mut materials = MaterialTable::new(description, &texture_index);
+    let mut materials = MaterialTable::new(materials);
     let origin = origin(description);
     let at = |transform: &Transform| {
         let mut to_world = to_affine(transform);
@@ -109,7 +117,21 @@ pub fn assemble(
         }
     }
     problems.append(&mut materials.problems);
-    let materials = materials.compiled;
+    let MaterialTable {
+        source,
+        compiled: materials,
+        features: mut needed,
+        mut notes,
+        ..
+    } = materials;
+    repairs.append(&mut notes);
+    let mut textures: Vec<Texture> = Vec::new();
+    for name in source.textures() {
+        match loaded.remove(name) {
+            Some(texture) => textures.push(texture),
+            None => problems.push(format!("the texture `{name}` is missing")),
+        }
+    }
     let Placing {
         scene_meshes,
         shared,
@@ -120,7 +142,7 @@ pub fn assemble(
         if object
             .materials
             .iter()
-            .any(|&m| has_radial_tangent(&materials[m]))
+            .any(|&m| materials[m].has_radial_tangent())
         {
             object.world_to_box = Some(box_of(object, &scene_meshes[object.mesh]));
         }
@@ -142,6 +164,9 @@ pub fn assemble(
                 World::Constant(Rgb::ZERO)
             }),
     };
+    if !problems.is_empty() {
+        return Err(ResolveError { problems });
+    }
     let triangles = emissive_triangles(&mut objects, &scene_meshes, &materials, &textures);
     let camera = description.camera.as_ref().map(|camera| {
         let resolution = [description.film.width, description.film.height];
@@ -177,7 +202,8 @@ pub fn assemble(
         camera,
         features: Features::NONE,
     };
-    scene.features = features(&scene);
+    needed.add_if(Features::TEXTURES, !scene.textures.is_empty());
+    scene.features = features(&scene).with(needed);
     Ok(Resolved {
         scene,
         settings: RenderSettings::new(description),
@@ -185,24 +211,24 @@ pub fn assemble(
     })
 }
 
-/// Compiles materials when an object first uses them.
+/// The materials that objects turn out to have.
 struct MaterialTable<'a> {
-    names: Names<'a>,
+    source: Materials<'a>,
     indices: BTreeMap<String, usize>,
     compiled: Vec<Material>,
+    features: Features,
+    notes: Vec<String>,
     problems: Vec<String>,
 }
 
 impl<'a> MaterialTable<'a> {
-    fn new(description: &'a Description, textures: &'a BTreeMap<String, usize>) -> Self {
+    fn new(source: Materials<'a>) -> Self {
         Self {
-            names: Names {
-                materials: &description.materials,
-                textures,
-                estimator: description.sampling.estimator,
-            },
+            source,
             indices: BTreeMap::new(),
             compiled: Vec::new(),
+            features: Features::NONE,
+            notes: Vec::new(),
             problems: Vec::new(),
         }
     }
@@ -212,12 +238,20 @@ impl<'a> MaterialTable<'a> {
         if let Some(&index) = self.indices.get(name) {
             return Some(index);
         }
-        let material = self.names.materials.get(name)?;
-        let compiled = compile_material(material, &self.names).unwrap_or_else(|error| {
-            self.problems.push(format!("materials.{name}: {error}"));
-            Material::default()
-        });
-        self.compiled.push(compiled);
+        let material = match self.source.get(name)? {
+            Ok(compiled) => {
+                self.features = self.features.with(compiled.needs.features);
+                let notes = compiled.needs.notes.iter();
+                self.notes
+                    .extend(notes.map(|note| format!("material `{name}`: {note}")));
+                compiled.material.clone()
+            }
+            Err(error) => {
+                self.problems.push(format!("materials.{name}: {error}"));
+                Material::default()
+            }
+        };
+        self.compiled.push(material);
         self.indices
             .insert(name.to_owned(), self.compiled.len() - 1);
         Some(self.compiled.len() - 1)
@@ -321,12 +355,7 @@ fn assign(
 ) -> Result<Vec<usize>, String> {
     let mut find = |name: &str, why: &str| {
         materials.index(name).ok_or_else(|| {
-            let known: Vec<&str> = materials
-                .names
-                .materials
-                .keys()
-                .map(String::as_str)
-                .collect();
+            let known: Vec<&str> = materials.source.names().collect();
             format!(
                 "{object}: there is no material `{name}`{why}; there are: {}",
                 known.join(", ")
@@ -427,12 +456,6 @@ fn box_of(object: &Object, mesh: &SceneMesh) -> Affine3A {
     to_box * to_local
 }
 
-fn has_radial_tangent(material: &Material) -> bool {
-    material.leaves.iter().any(|weighted| {
-        matches!(&weighted.leaf, Leaf::Rough(rough) if matches!(rough.tangent, Tangent::Radial(_)))
-    })
-}
-
 /// Lists the triangles of emissive objects for the light sampler, and numbers
 /// the objects' first ones.
 fn emissive_triangles(
@@ -448,6 +471,11 @@ fn emissive_triangles(
         }
         object.first_emitter = u32::try_from(emissive.len()).ok();
         let mesh = &meshes[object.mesh];
+        let radiance: Vec<Rgb> = object
+            .materials
+            .iter()
+            .map(|&material| materials[material].mean_emission(textures))
+            .collect();
         for (index, corners) in mesh.triangles.iter().enumerate() {
             let slot = mesh.slots.as_ref().map_or(0, |slots| slots[index] as usize);
             let vertices = corners.map(|i| {
@@ -458,7 +486,7 @@ fn emissive_triangles(
                         .map_or(p, |to_world| to_world.transform_point3a(p)),
                 )
             });
-            let radiance = mean_emission(&materials[object.materials[slot]], textures);
+            let radiance = radiance[slot];
             emissive.push(EmissiveTriangle { vertices, radiance });
         }
     }
@@ -477,24 +505,7 @@ fn emitters(objects: &[Object], meshes: &[SceneMesh]) -> Vec<u32> {
         .collect()
 }
 
-/// What a material shines on average, W·m⁻²·sr⁻¹: textures by their mean.
-fn mean_emission(material: &Material, textures: &[Texture]) -> Rgb {
-    let mut sum = Rgb::ZERO;
-    for weighted in &material.leaves {
-        if let Leaf::Emission(tint, strength) = weighted.leaf {
-            let color = match tint {
-                Tint::Constant(color) => color,
-                Tint::Texture(index) => Rgb::from(textures[index].mean()),
-            };
-            // Textured mix factors count as one half.
-            let factors = 0.5f32.powi(weighted.factors.len() as i32);
-            sum += color * (strength * weighted.share * factors);
-        }
-    }
-    sum
-}
-
-/// What the scene uses, and so which kernel can render it.
+/// What the scene uses, materials aside.
 fn features(scene: &Scene) -> Features {
     let mut set = Features::NONE;
     set.add_if(Features::LIGHT_SAMPLING, !scene.lights.is_empty());
@@ -523,39 +534,5 @@ fn features(scene: &Scene) -> Features {
         Features::DEPTH_OF_FIELD,
         scene.camera.as_ref().is_some_and(Camera::has_lens),
     );
-    set.add_if(Features::TEXTURES, !scene.textures.is_empty());
-    for material in &scene.materials {
-        set.add_if(Features::MIXES, material.leaves.len() > 1);
-        for weighted in &material.leaves {
-            match &weighted.leaf {
-                Leaf::Lambert(_) | Leaf::Emission(..) => {}
-                Leaf::Transparent(_) => set.add_if(Features::TRANSPARENCY, true),
-                Leaf::Rough(rough) => {
-                    let smooth = matches!(
-                        rough.roughness,
-                        Roughness::Alpha(Number::Constant(x), Number::Constant(y)) if x == 0.0 && y == 0.0
-                    ) || matches!(
-                        rough.roughness,
-                        Roughness::Blender { roughness: Number::Constant(r), .. } if r == 0.0
-                    );
-                    let multiple = rough.method.is_multiple() && !smooth;
-                    set.add_if(Features::MULTIPLE_SCATTERING, multiple);
-                    set.add_if(Features::ANISOTROPY, rough.tangent != Tangent::Any);
-                    set.add_if(
-                        Features::BECKMANN,
-                        rough.distribution == Distribution::Beckmann,
-                    );
-                    set.add_if(
-                        match rough.facet {
-                            Facet::Metal(_) | Facet::Tinted(_) => Features::METALS,
-                            Facet::Glass(..) => Features::TRANSMISSION,
-                            Facet::Matte(_) => Features::DIFFUSE_FACETS,
-                        },
-                        true,
-                    );
-                }
-            }
-        }
-    }
     set
 }

@@ -6,7 +6,9 @@ use super::findings::{Findings, Kind};
 use super::means::{Mean, bound};
 use glam::Vec3;
 use rayon::prelude::*;
-use smithwalk::bsdf::{Closure, Interface, Lambert, Method, Mirror, Rough};
+use smithwalk::bsdf::{
+    ByFacets, Closure, Distribution, Interface, Lambert, Listed, Method, Mirror, RoughClosure,
+};
 use smithwalk_model::*;
 
 /// A closure, what single scattering on it is, and what it is called.
@@ -28,42 +30,27 @@ const METHODS: [Method; 4] = [
     Method::Thinned(Estimator::PositionFree),
 ];
 
-/// Both distributions on the facets.
-macro_rules! both {
-    ($list:ident, $name:expr, $alpha:expr, $method:expr, $facets:expr, $ggx:ident, $beckmann:ident, $flags:expr) => {
-        let (alpha_x, alpha_y) = ($alpha.0 as f32, $alpha.1 as f32);
-        let [transmits, lossless] = $flags;
-        for ggx in [true, false] {
-            let closure = |method| {
-                if ggx {
-                    let surface = Microsurface {
-                        ndf: Ggx { alpha_x, alpha_y },
-                        facets: $facets,
-                    };
-                    Closure::$ggx(Rough { surface, method })
-                } else {
-                    let surface = Microsurface {
-                        ndf: Beckmann { alpha_x, alpha_y },
-                        facets: $facets,
-                    };
-                    Closure::$beckmann(Rough { surface, method })
-                }
-            };
-            $list.push(Subject {
-                name: format!(
-                    "{} {} {:?} {:?}",
-                    if ggx { "GGX" } else { "Beckmann" },
-                    $name,
-                    $alpha,
-                    $method
-                ),
-                closure: closure($method),
-                single: closure(Method::Single),
-                transmits,
-                lossless,
-            });
-        }
-    };
+/// The facets with every distribution.
+fn each_distribution(
+    list: &mut Vec<Subject>,
+    name: &str,
+    alpha: (f64, f64),
+    method: Method,
+    facets: impl Listed,
+    [transmits, lossless]: [bool; 2],
+) {
+    let alphas = [alpha.0 as f32, alpha.1 as f32];
+    for &distribution in Distribution::ALL {
+        let closure =
+            |method| Closure::Rough(RoughClosure::new(distribution, alphas, facets, method));
+        list.push(Subject {
+            name: format!("{distribution:?} {name} {alpha:?} {method:?}"),
+            closure: closure(method),
+            single: closure(Method::Single),
+            transmits,
+            lossless,
+        });
+    }
 }
 
 /// All closures of one roughness.
@@ -71,48 +58,51 @@ fn rough(alpha: (f64, f64), method: Method) -> Vec<Subject> {
     let mut list = vec![];
     for fresnel in metals() {
         let lossless = fresnel == ConductorFresnel::Constant(Rgb::white());
-        both!(
-            list,
-            format!("{fresnel:?}"),
+        let name = format!("{fresnel:?}");
+        each_distribution(
+            &mut list,
+            &name,
             alpha,
             method,
             Conductor { fresnel },
-            GgxConductor,
-            BeckmannConductor,
-            [false, lossless]
+            [false, lossless],
         );
     }
     for eta in [1e-3, 1.0 / 1.5, 1.0, 1.0 + 1e-7, 1.0 + 1e-5, 1.5, 1e3f32] {
-        let facets = Dielectric {
-            eta,
-            tint: Rgb::white(),
-        };
-        both!(
-            list,
-            format!("η {eta}"),
+        let tint = Rgb::white();
+        let name = format!("η {eta}");
+        each_distribution(
+            &mut list,
+            &name,
             alpha,
             method,
-            facets,
-            GgxDielectric,
-            BeckmannDielectric,
-            [true, true]
+            Dielectric { eta, tint },
+            [true, true],
+        );
+        let glass = Glass {
+            eta,
+            reflection: Rgb([1.0, 0.5, 0.0]),
+            transmission: Rgb([1.0, 0.0, 0.5]),
+        };
+        let name = format!("coloured η {eta}");
+        each_distribution(&mut list, &name, alpha, method, glass, [true, false]);
+        let name = format!("refraction η {eta}");
+        each_distribution(
+            &mut list,
+            &name,
+            alpha,
+            method,
+            Refraction { eta, tint },
+            [true, false],
         );
     }
     for albedo in [[1.0; 3], [0.0; 3], [0.9, 0.0, 0.5]] {
+        let lossless = albedo == [1.0; 3];
+        let name = format!("diffuse {albedo:?}");
         let facets = Diffuse {
             albedo: Rgb(albedo),
         };
-        let lossless = albedo == [1.0; 3];
-        both!(
-            list,
-            format!("diffuse {albedo:?}"),
-            alpha,
-            method,
-            facets,
-            GgxDiffuse,
-            BeckmannDiffuse,
-            [false, lossless]
-        );
+        each_distribution(&mut list, &name, alpha, method, facets, [false, lossless]);
     }
     list
 }
@@ -138,10 +128,7 @@ fn smooth() -> Vec<Subject> {
         );
     }
     for eta in [1e-3, 1.0 / 1.5, 1.0 - 1e-7, 1.0, 1.0 + 1e-7, 1.5, 1e3f32] {
-        let interface = Interface {
-            eta,
-            color: glam::Vec3::ONE,
-        };
+        let interface = Interface::colored(eta, glam::Vec3::ONE);
         push(
             format!("interface {eta}"),
             Closure::Interface(interface),
@@ -321,7 +308,9 @@ fn albedo(subject: &Subject, cos: f64, seed: u64, count: u32) -> Mean {
     let sides = if subject.transmits { 0.5 } else { 1.0 };
     let diffuse = matches!(
         subject.closure,
-        Closure::GgxDiffuse(_) | Closure::BeckmannDiffuse(_)
+        Closure::Rough(
+            RoughClosure::Ggx(ByFacets::Diffuse(_)) | RoughClosure::Beckmann(ByFacets::Diffuse(_))
+        )
     );
     let light = |wi: Vec3| {
         let lobe = wi.z.abs() * std::f32::consts::FRAC_1_PI;

@@ -94,7 +94,7 @@ pub const ETAS: [f64; 10] = [
 ];
 
 /// Metals: reflectances exactly 0 and 1, and complex indices up to 10³ + 10⁴ i.
-pub fn metals<F: Real>() -> [ConductorFresnel<F>; 7] {
+pub fn metals<F: Real>() -> [ConductorFresnel<F>; 8] {
     let rgb = |v: [f64; 3]| Rgb(v.map(F::of));
     [
         ConductorFresnel::Constant(Rgb::white()),
@@ -114,6 +114,11 @@ pub fn metals<F: Real>() -> [ConductorFresnel<F>; 7] {
         ConductorFresnel::F82 {
             f0: rgb([0.0, 1.0, 1.0]),
             f82: rgb([1.0, 0.0, 1.0]),
+        },
+        ConductorFresnel::Dielectric {
+            eta: F::of(1.5),
+            f0: rgb([0.0, 0.04, 1.0]),
+            f90: rgb([1.0, 0.5, 0.0]),
         },
     ]
 }

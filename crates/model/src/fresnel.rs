@@ -107,6 +107,23 @@ pub fn f82<F: Real>(cos: F, f0: F, f82: F) -> F {
         .min(one)
 }
 
+/// A dielectric's reflectance at normal incidence, ((η − 1)/(η + 1))².
+#[inline]
+pub fn normal_reflectance<F: Real>(eta: F) -> F {
+    let r = (eta - F::one()) / (eta + F::one());
+    r * r
+}
+
+/// How far the reflectance of a dielectric of relative index `eta` has risen at
+/// the cosine `cos` from that at normal incidence, 0, to all, 1.
+#[inline]
+pub fn rise<F: Real>(cos: F, eta: F) -> F {
+    let f0 = normal_reflectance(eta);
+    let f = dielectric(cos, eta).0;
+    // F keeps its minimum at normal incidence, but for rounding.
+    ((f - f0) / (F::one() - f0)).max(F::zero())
+}
+
 /// The reflectance of conductor facets, per colour channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConductorFresnel<F> {
@@ -131,6 +148,15 @@ pub enum ConductorFresnel<F> {
         /// Reflectance at cosθ = 1/7.
         f82: Rgb<F>,
     },
+    /// The curve of a dielectric, stretched to go from `f0` to `f90`.
+    Dielectric {
+        /// Relative index of refraction, inside over outside.
+        eta: F,
+        /// Reflectance at normal incidence.
+        f0: Rgb<F>,
+        /// Reflectance at grazing incidence and under total reflection.
+        f90: Rgb<F>,
+    },
 }
 
 impl<F: Real> ConductorFresnel<F> {
@@ -147,6 +173,34 @@ impl<F: Real> ConductorFresnel<F> {
             Self::F82 { f0, f82: edge } => {
                 Rgb(std::array::from_fn(|c| f82(cos, f0.0[c], edge.0[c])))
             }
+            Self::Dielectric { eta, f0, f90 } => {
+                let rise = rise(cos, eta);
+                f0 * (F::one() - rise) + f90 * rise
+            }
+        }
+    }
+}
+
+impl ConductorFresnel<f64> {
+    /// The same in single precision.
+    pub fn to_single(&self) -> ConductorFresnel<f32> {
+        let rgb = |c: Rgb<f64>| Rgb(c.0.map(|c| c as f32));
+        match *self {
+            Self::Constant(color) => ConductorFresnel::Constant(rgb(color)),
+            Self::Complex { eta, k } => ConductorFresnel::Complex {
+                eta: rgb(eta),
+                k: rgb(k),
+            },
+            Self::Schlick { f0 } => ConductorFresnel::Schlick { f0: rgb(f0) },
+            Self::F82 { f0, f82 } => ConductorFresnel::F82 {
+                f0: rgb(f0),
+                f82: rgb(f82),
+            },
+            Self::Dielectric { eta, f0, f90 } => ConductorFresnel::Dielectric {
+                eta: eta as f32,
+                f0: rgb(f0),
+                f90: rgb(f90),
+            },
         }
     }
 }
@@ -220,6 +274,30 @@ mod tests {
         let (eta, k) = (0.2f64, 3.9f64);
         let expected = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
         assert!((complex(1.0, eta, k) - expected).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_stretched_dielectric_goes_from_end_to_end() {
+        let eta = 1.5;
+        let own = |cos| {
+            let f0 = Rgb([normal_reflectance(eta); 3]);
+            let f90 = Rgb([1.0; 3]);
+            ConductorFresnel::Dielectric { eta, f0, f90 }
+                .reflectance(cos)
+                .0[1]
+        };
+        for cos in [0.0, 0.1, 0.5, 0.9, 1.0f64] {
+            assert!(
+                (own(cos) - dielectric(cos, eta).0).abs() < 1e-15,
+                "cos {cos}"
+            );
+        }
+        let (f0, f90) = (Rgb([0.2, 0.4, 0.0]), Rgb([1.0, 0.5, 0.3]));
+        let curve = ConductorFresnel::Dielectric { eta, f0, f90 };
+        for c in 0..3 {
+            assert!((curve.reflectance(1.0).0[c] - f0.0[c]).abs() < 1e-14);
+            assert!((curve.reflectance(0.0).0[c] - f90.0[c]).abs() < 1e-14);
+        }
     }
 
     #[test]

@@ -79,7 +79,9 @@ struct Readme;
 pub use {num_traits, rand, wide};
 
 pub use draw::{Draw, Stream};
-pub use facets::{At, Bounce, Conductor, Dielectric, Diffuse, Facets, Phase, Side};
+pub use facets::{
+    At, Bounce, Conductor, Dielectric, Diffuse, Facets, Glass, Phase, Refraction, Side,
+};
 pub use fresnel::ConductorFresnel;
 pub use lanes::{BeckmannLanes, Directions, GgxLanes, LANES, NdfInLanes, NdfLanes};
 pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};

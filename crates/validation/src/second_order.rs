@@ -203,19 +203,7 @@ impl Configuration {
 
     /// The mean of eight walks at a time, which are in single precision.
     fn in_lanes(&self, samples: u32, index: usize) -> Mean {
-        let rgb = |c: Rgb<f64>| Rgb(c.0.map(|c| c as f32));
-        let fresnel = match self.fresnel {
-            ConductorFresnel::Constant(color) => ConductorFresnel::Constant(rgb(color)),
-            ConductorFresnel::Complex { eta, k } => ConductorFresnel::Complex {
-                eta: rgb(eta),
-                k: rgb(k),
-            },
-            ConductorFresnel::Schlick { f0 } => ConductorFresnel::Schlick { f0: rgb(f0) },
-            ConductorFresnel::F82 { f0, f82 } => ConductorFresnel::F82 {
-                f0: rgb(f0),
-                f82: rgb(f82),
-            },
-        };
+        let fresnel = self.fresnel.to_single();
         let facets = Conductor { fresnel };
         let (x, y) = self.distribution.alpha();
         let (alpha_x, alpha_y) = (x as f32, y as f32);

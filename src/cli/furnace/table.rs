@@ -1,6 +1,5 @@
 //! White materials one by one: directional albedos.
 
-use std::collections::BTreeMap;
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::io::Write;
 
@@ -10,7 +9,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use smithwalk::bsdf::Bsdf;
 use smithwalk::description::{Estimator, Material};
-use smithwalk::scene::{Names, compile_material};
+use smithwalk::scene::compile_alone;
 use smithwalk_model::{Draw, Stream};
 
 pub const KINDS: [&str; 3] = ["conductor", "dielectric", "rough_diffuse"];
@@ -72,15 +71,10 @@ pub fn measure(samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
         .enumerate()
         .map(|(index, (kind, distribution, alpha, cos))| {
             let material = Material::from_yaml(&white(kind, distribution, alpha))?;
-            let names = Names {
-                materials: &BTreeMap::new(),
-                textures: &BTreeMap::new(),
-                estimator: Estimator::Auto,
-            };
             let stream = seed.wrapping_mul(1 << 20).wrapping_add(index as u64);
             let mut rng = Stream(rand_pcg::Pcg64Mcg::seed_from_u64(stream));
             let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-            let bsdf = compile_material(&material, &names)?.horizontal(wo);
+            let bsdf = compile_alone(&material, Estimator::Auto)?.horizontal(wo);
             let (sampled, combined) = albedos(&bsdf, wo, samples, &mut rng);
             Ok(Row {
                 kind,

@@ -17,15 +17,42 @@ pub struct Dielectric<F> {
     pub tint: Rgb<F>,
 }
 
-impl<F: Real> Dielectric<F> {
-    /// Relative index of the far side, seen from `side`.
-    #[inline]
-    fn eta_from(&self, side: Side) -> F {
-        match side {
-            Side::Above => self.eta,
-            Side::Below => self.eta.recip(),
-        }
+/// A facet that refracts `at` into `o`: the cosines of both to its normal, and
+/// the two factors of the density of `o`, sr⁻¹, without the transmittance.
+pub(super) struct Refracted<F> {
+    pub(super) cos: F,
+    pub(super) cos_o: F,
+    /// D(m) ⟨w·m⟩ / σ(w).
+    pub(super) visible: F,
+    /// η² |ω·m| / |w + ηω|².
+    pub(super) jacobian: F,
+}
+
+/// The facet that refracts `at` into `o`, with n(far) / n(near) = `eta`; `None`
+/// if there is none.
+#[inline]
+pub(super) fn refracted<F: Real, N: Ndf<Scalar = F>>(
+    ndf: &N,
+    at: At<F>,
+    o: Vector3<F>,
+    eta: F,
+) -> Option<Refracted<F>> {
+    let zero = F::zero();
+    let h = at.w + o * eta;
+    let length = h.length();
+    if length == zero || at.sigma == zero {
+        return None;
     }
+    // Micro-normals point up.
+    let m = h * (if h.z < zero { -length } else { length }).recip();
+    let (cos, cos_o) = (at.w.dot(m), -o.dot(m));
+    (cos > zero && m.z > zero && cos_o > zero).then(|| Refracted {
+        cos,
+        cos_o,
+        visible: ndf.density(m) * (cos / at.sigma),
+        // In this order no intermediate overflows in f32 near η = 1.
+        jacobian: (eta / length) * (cos_o / length) * eta,
+    })
 }
 
 impl<F: Real> Facets for Dielectric<F> {
@@ -42,7 +69,7 @@ impl<F: Real> Facets for Dielectric<F> {
         m: Vector3<F>,
         rng: &mut impl Draw<F>,
     ) -> Bounce<F> {
-        let eta = self.eta_from(side);
+        let eta = side.eta(self.eta);
         let cos = w.dot(m).max(F::zero()).min(F::one());
         let (reflectance, cos_t) = fresnel::dielectric(cos, eta);
         let crosses = rng.draw() >= reflectance;
@@ -67,36 +94,23 @@ impl<F: Real> Facets for Dielectric<F> {
         crosses: bool,
         _: Vector3<F>,
     ) -> Phase<F> {
-        let eta = self.eta_from(at.side);
-        let h = if crosses { at.w + o * eta } else { at.w + o };
-        let length = h.length();
-        if length == F::zero() || at.sigma == F::zero() {
-            return Phase::none();
-        }
-        // Micro-normals point up.
-        let m = h * (if h.z < F::zero() { -length } else { length }).recip();
-        // By reflection |w + o| = 2 w·m, which rounding at grazing angles can't
-        // make zero or negative, as it can the scalar product.
-        let cos = if crosses {
-            at.w.dot(m)
-        } else {
-            F::of(0.5) * length
-        };
-        if cos <= F::zero() || m.z <= F::zero() {
-            return Phase::none();
-        }
+        let eta = at.side.eta(self.eta);
         let density = if crosses {
-            let cos_o = -o.dot(m);
-            if cos_o <= F::zero() {
+            let Some(facet) = refracted(ndf, at, o, eta) else {
+                return Phase::none();
+            };
+            fresnel::transmittance(facet.cos, facet.cos_o, eta) * facet.visible * facet.jacobian
+        } else {
+            let h = at.w + o;
+            let length = h.length();
+            if h.z <= F::zero() || length == F::zero() || at.sigma == F::zero() {
                 return Phase::none();
             }
-            // In this order no intermediate overflows in f32 near η = 1.
-            let jacobian = (eta / length) * (cos_o / length) * eta;
-            fresnel::transmittance(cos, cos_o, eta) * (ndf.density(m) * (cos / at.sigma)) * jacobian
-        } else if h.z > F::zero() {
-            fresnel::dielectric(cos.min(F::one()), eta).0 * ndf.density(m) / (F::of(4.0) * at.sigma)
-        } else {
-            return Phase::none();
+            // |w + o| = 2 w·m, which rounding at grazing angles can't make zero
+            // or negative, as it can the scalar product.
+            let cos = (F::of(0.5) * length).min(F::one());
+            let m = h * length.recip();
+            fresnel::dielectric(cos, eta).0 * ndf.density(m) / (F::of(4.0) * at.sigma)
         };
         Phase {
             density,

@@ -3,10 +3,14 @@
 mod conductor;
 mod dielectric;
 mod diffuse;
+mod glass;
+mod refraction;
 
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
+pub use glass::Glass;
+pub use refraction::Refraction;
 
 use num_traits::One;
 
@@ -29,6 +33,15 @@ impl Side {
         match self {
             Self::Above => Self::Below,
             Self::Below => Self::Above,
+        }
+    }
+
+    /// The relative index of the far side, for n(below) / n(above) = `eta`.
+    #[inline]
+    fn eta<F: Real>(self, eta: F) -> F {
+        match self {
+            Self::Above => eta,
+            Self::Below => eta.recip(),
         }
     }
 }

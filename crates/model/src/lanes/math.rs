@@ -107,6 +107,13 @@ pub(super) fn reflectance(fresnel: &ConductorFresnel<f32>, cos: f32x8) -> [f32x8
         ConductorFresnel::Complex { eta, k } => each(&|c| complex(cos, eta.0[c], k.0[c])),
         ConductorFresnel::Schlick { f0 } => f0.0.map(|f0| schlick(cos, f0)),
         ConductorFresnel::F82 { f0, f82: edge } => each(&|c| f82(cos, f0.0[c], edge.0[c])),
+        ConductorFresnel::Dielectric { eta, f0, f90 } => {
+            let normal = crate::fresnel::normal_reflectance(*eta);
+            let rise = ((complex(cos, *eta, 0.0) - f32x8::from(normal))
+                * f32x8::from((1.0 - normal).recip()))
+            .fast_max(f32x8::ZERO);
+            each(&|c| f32x8::from(f0.0[c]) + rise * f32x8::from(f90.0[c] - f0.0[c]))
+        }
     }
 }
 

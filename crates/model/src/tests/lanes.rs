@@ -101,8 +101,13 @@ fn metals<N: Paired>() -> Vec<(N, ConductorFresnel<f64>)> {
             f0: Rgb([0.9, 0.6, 0.5]),
             f82: Rgb([0.8, 0.6, 0.9]),
         },
+        ConductorFresnel::Dielectric {
+            eta: 1.5,
+            f0: Rgb([0.5, 0.6, 0.4]),
+            f90: Rgb([1.0, 0.8, 0.9]),
+        },
     ];
-    let alphas = [(0.64, 0.64), (0.2, 0.2), (1.5, 1.5), (0.8, 0.2)];
+    let alphas = [(0.64, 0.64), (0.2, 0.2), (1.5, 1.5), (0.8, 0.2), (0.5, 0.5)];
     alphas
         .into_iter()
         .zip(fresnels)
@@ -119,19 +124,7 @@ fn in_single<N: Paired>(
     ndf: &N,
     fresnel: &ConductorFresnel<f64>,
 ) -> Microsurface<N::Single, Conductor<f32>> {
-    let rgb = |c: Rgb<f64>| Rgb(c.0.map(|c| c as f32));
-    let fresnel = match *fresnel {
-        ConductorFresnel::Constant(color) => ConductorFresnel::Constant(rgb(color)),
-        ConductorFresnel::Complex { eta, k } => ConductorFresnel::Complex {
-            eta: rgb(eta),
-            k: rgb(k),
-        },
-        ConductorFresnel::Schlick { f0 } => ConductorFresnel::Schlick { f0: rgb(f0) },
-        ConductorFresnel::F82 { f0, f82 } => ConductorFresnel::F82 {
-            f0: rgb(f0),
-            f82: rgb(f82),
-        },
-    };
+    let fresnel = fresnel.to_single();
     Microsurface {
         ndf: ndf.single(),
         facets: Conductor { fresnel },

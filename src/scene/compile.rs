@@ -1,0 +1,616 @@
+//! From what the file says of a material to what is rendered, and to what that
+//! needs: names become indices, mixes flat lists, the estimator is chosen.
+
+use std::collections::BTreeMap;
+
+use arrayvec::ArrayVec;
+
+use super::material::{
+    Facet, Factor, Leaf, Material, Number, Principled3, Principled4, Reflectance, RoughMaterial,
+    Roughness, Setup, Tangent, Tint, WeightedLeaf,
+};
+use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, Rises, WhiteFacets};
+use crate::color::Rgb;
+use crate::description as desc;
+use crate::features::Features;
+use smithwalk_model as model;
+
+/// What can keep a material that reads well from being rendered.
+#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
+pub enum MaterialError {
+    /// Nested mixes with too many leaves.
+    #[error("the mix comes to more than {MAX_CLOSURES} closures in all, the most there can be")]
+    TooManyClosures,
+    /// A name that is not among the materials.
+    #[error("there is no material `{0}`")]
+    UnknownMaterial(String),
+    /// A name that is not among the textures.
+    #[error("there is no texture `{0}`")]
+    UnknownTexture(String),
+    /// A kind that the format has and the renderer not.
+    #[error("`{0}` can't be rendered yet")]
+    Unknown(&'static str),
+    /// A textured index of refraction where a table is made for each.
+    #[error("the estimator `compensated` takes no texture for `ior`")]
+    TexturedIndex,
+}
+
+/// What a material needs of everything else.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Whether it looks at texture coordinates.
+    pub uvs: bool,
+    /// What a kernel has to have.
+    pub features: Features,
+    /// What is rendered otherwise than the file says, for people.
+    pub notes: Vec<&'static str>,
+}
+
+/// A material and what it needs.
+#[derive(Clone, Debug)]
+pub struct Compiled {
+    /// As it is rendered.
+    pub material: Material,
+    /// What that takes.
+    pub needs: Needs,
+}
+
+/// The materials of a file, each compiled when it is first asked for.
+#[derive(Debug)]
+pub struct Materials<'a> {
+    described: &'a BTreeMap<String, desc::Material>,
+    estimator: desc::Estimator,
+    known_textures: &'a BTreeMap<String, desc::Texture>,
+    /// Names of the textures in use, by their index.
+    textures: Vec<String>,
+    compiled: BTreeMap<String, Result<Compiled, MaterialError>>,
+}
+
+impl<'a> Materials<'a> {
+    /// Nothing compiled yet.
+    #[must_use]
+    pub fn of(description: &'a desc::Description) -> Self {
+        Self {
+            described: &description.materials,
+            estimator: description.sampling.estimator,
+            known_textures: &description.textures,
+            textures: Vec::new(),
+            compiled: BTreeMap::new(),
+        }
+    }
+
+    /// The material of this name; `None` if there is none.
+    ///
+    /// # Errors
+    /// What keeps it from being rendered.
+    pub fn get(&mut self, name: &str) -> Option<Result<&Compiled, MaterialError>> {
+        if !self.compiled.contains_key(name) {
+            let compiled = self.compile(self.described.get(name)?);
+            self.compiled.insert(name.to_owned(), compiled);
+        }
+        let compiled = self.compiled.get(name)?;
+        Some(compiled.as_ref().map_err(Clone::clone))
+    }
+
+    /// The names of all materials.
+    pub fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.described.keys().map(String::as_str)
+    }
+
+    /// Names of the textures that compiled materials look up, in the order of
+    /// their indices.
+    #[must_use]
+    pub fn textures(&self) -> &[String] {
+        &self.textures
+    }
+
+    fn compile(&mut self, material: &desc::Material) -> Result<Compiled, MaterialError> {
+        let textured = self.textures.len();
+        let mut compiler = Compiler {
+            described: self.described,
+            known_textures: Some(self.known_textures),
+            estimator: self.estimator,
+            textures: std::mem::take(&mut self.textures),
+            needs: Needs::default(),
+            leaves: Vec::new(),
+            closures: 0,
+        };
+        let result = compiler.add(material, &Above::default());
+        self.textures = std::mem::take(&mut compiler.textures);
+        if result.is_err() {
+            self.textures.truncate(textured);
+        }
+        result.map(|()| compiler.finish())
+    }
+}
+
+/// Compiles a material that names neither textures nor other materials.
+///
+/// # Errors
+/// When it does, or when its mixes have too many leaves.
+pub fn compile_alone(
+    material: &desc::Material,
+    estimator: desc::Estimator,
+) -> Result<Material, MaterialError> {
+    let mut compiler = Compiler {
+        described: &BTreeMap::new(),
+        known_textures: None,
+        estimator,
+        textures: Vec::new(),
+        needs: Needs::default(),
+        leaves: Vec::new(),
+        closures: 0,
+    };
+    compiler.add(material, &Above::default())?;
+    Ok(compiler.finish().material)
+}
+
+/// The product of mix factors above a material.
+#[derive(Clone)]
+struct Above {
+    share: f32,
+    factors: ArrayVec<(Factor, bool), MAX_CLOSURES>,
+}
+
+impl Default for Above {
+    fn default() -> Self {
+        Self {
+            share: 1.0,
+            factors: ArrayVec::new(),
+        }
+    }
+}
+
+impl Above {
+    /// One level down, on the side of `b` or on that of `a`.
+    fn below(&self, factor: Factor, is_b: bool) -> Result<Self, MaterialError> {
+        let mut below = self.clone();
+        match factor {
+            Factor::Share(Number::Constant(f)) => below.share *= if is_b { f } else { 1.0 - f },
+            _ => below
+                .factors
+                .try_push((factor, !is_b))
+                .map_err(|_| MaterialError::TooManyClosures)?,
+        }
+        Ok(below)
+    }
+}
+
+/// One material on its way.
+struct Compiler<'a> {
+    described: &'a BTreeMap<String, desc::Material>,
+    known_textures: Option<&'a BTreeMap<String, desc::Texture>>,
+    estimator: desc::Estimator,
+    textures: Vec<String>,
+    needs: Needs,
+    leaves: Vec<WeightedLeaf>,
+    /// How many closures the leaves come to at the most.
+    closures: usize,
+}
+
+impl<'a> Compiler<'a> {
+    fn finish(mut self) -> Compiled {
+        let closures = self.leaves.len();
+        self.need_if(Features::MIXES, closures > 1);
+        let weighted = |l: &WeightedLeaf| l.share != 1.0 || !l.factors.is_empty();
+        self.need_if(Features::MIXES, self.leaves.iter().any(weighted));
+        Compiled {
+            material: Material {
+                leaves: self.leaves,
+            },
+            needs: self.needs,
+        }
+    }
+
+    fn need_if(&mut self, features: Features, condition: bool) {
+        self.needs.features.add_if(features, condition);
+    }
+
+    /// Adds the leaves of a material.
+    fn add(&mut self, material: &desc::Material, above: &Above) -> Result<(), MaterialError> {
+        let leaf = match material {
+            desc::Material::Mix(mix) => {
+                let factor = self.factor(&mix.factor)?;
+                for (child, is_b) in [(&mix.a, false), (&mix.b, true)] {
+                    let below = above.below(factor, is_b)?;
+                    // A share of exactly zero never contributes.
+                    if below.share > 0.0 {
+                        self.add_part(child, &below)?;
+                    }
+                }
+                return Ok(());
+            }
+            desc::Material::Sum(sum) => {
+                self.add_part(&sum.a, above)?;
+                return self.add_part(&sum.b, above);
+            }
+            desc::Material::Conductor(conductor) => {
+                let reflectance = self.metal(&conductor.reflectance)?;
+                self.rough(&conductor.rough, Facet::Metal(reflectance))?
+            }
+            desc::Material::Dielectric(glass) => {
+                let facet = Facet::Glass(self.number(&glass.ior)?, self.tint(&glass.color)?);
+                self.rough(&glass.rough, facet)?
+            }
+            desc::Material::Refraction(glass) => {
+                let facet = Facet::Refraction(self.number(&glass.ior)?, self.tint(&glass.color)?);
+                self.need_if(Features::TRANSMISSION, true);
+                self.rough(&glass.rough, facet)?
+            }
+            desc::Material::RoughDiffuse(matte) => {
+                let facet = Facet::Matte(self.tint(&matte.color)?);
+                self.rough(&matte.rough, facet)?
+            }
+            desc::Material::Diffuse(diffuse) => {
+                let tint = self.tint(&diffuse.color)?;
+                match self.number(&diffuse.roughness)? {
+                    Number::Constant(0.0) => Leaf::Lambert(tint),
+                    roughness => {
+                        self.need_if(Features::DIFFUSERS, true);
+                        Leaf::OrenNayar(tint, roughness, diffuse.version)
+                    }
+                }
+            }
+            desc::Material::Translucent(part) => {
+                self.need_if(Features::DIFFUSERS, true);
+                Leaf::Translucent(self.tint(&part.color)?)
+            }
+            desc::Material::Velvet(velvet) => {
+                self.need_if(Features::DIFFUSERS, true);
+                Leaf::Velvet(self.tint(&velvet.color)?, self.number(&velvet.sigma)?)
+            }
+            desc::Material::Sheen(_) => return Err(MaterialError::Unknown("sheen")),
+            desc::Material::Principled(node) => self.principled(node)?,
+            desc::Material::Emission(emission) => Leaf::Emission(
+                self.tint(&emission.color)?,
+                self.number(&emission.strength)?,
+            ),
+            desc::Material::Transparent(part) => {
+                self.need_if(Features::TRANSPARENCY, true);
+                Leaf::Transparent(self.tint(&part.color)?)
+            }
+        };
+        self.closures += leaf.most_closures();
+        if self.closures > MAX_CLOSURES {
+            return Err(MaterialError::TooManyClosures);
+        }
+        self.leaves.push(WeightedLeaf {
+            share: above.share,
+            factors: above.factors.clone(),
+            leaf,
+        });
+        Ok(())
+    }
+
+    fn add_part(&mut self, part: &desc::MaterialRef, above: &Above) -> Result<(), MaterialError> {
+        let material = match part {
+            desc::MaterialRef::Inline(material) => material,
+            desc::MaterialRef::Name(name) => {
+                let described = self.described.get(name);
+                described.ok_or_else(|| MaterialError::UnknownMaterial(name.clone()))?
+            }
+        };
+        self.add(material, above)
+    }
+
+    fn texture(&mut self, name: &str) -> Result<usize, MaterialError> {
+        if !self
+            .known_textures
+            .is_some_and(|known| known.contains_key(name))
+        {
+            return Err(MaterialError::UnknownTexture(name.to_owned()));
+        }
+        self.needs.uvs = true;
+        if let Some(index) = self.textures.iter().position(|known| known == name) {
+            return Ok(index);
+        }
+        self.textures.push(name.to_owned());
+        Ok(self.textures.len() - 1)
+    }
+
+    fn number(&mut self, scalar: &desc::Scalar) -> Result<Number, MaterialError> {
+        match scalar {
+            desc::Scalar::Value(value) => Ok(Number::Constant(*value)),
+            desc::Scalar::Texture { name, channel } => {
+                Ok(Number::Texture(self.texture(name)?, *channel))
+            }
+        }
+    }
+
+    fn tint(&mut self, color: &desc::Color) -> Result<Tint, MaterialError> {
+        match color {
+            desc::Color::Value(value) => Ok(Tint::Constant(Rgb::from(*value))),
+            desc::Color::Texture(name) => Ok(Tint::Texture(self.texture(name)?)),
+        }
+    }
+
+    fn factor(&mut self, factor: &desc::Factor) -> Result<Factor, MaterialError> {
+        let factor = match factor {
+            desc::Factor::Share(share) => Factor::Share(self.number(share)?),
+            desc::Factor::Fresnel { ior } => Factor::Fresnel(self.number(ior)?),
+            desc::Factor::Facing { blend } => Factor::Facing(self.number(blend)?),
+            desc::Factor::Backfacing => Factor::Backfacing,
+            desc::Factor::CameraRay => Factor::CameraRay,
+        };
+        self.need_if(factor.features(), true);
+        Ok(factor)
+    }
+
+    fn metal(&mut self, reflectance: &desc::Reflectance) -> Result<Reflectance, MaterialError> {
+        Ok(match reflectance {
+            desc::Reflectance::Color(color) => Reflectance::Constant(self.tint(color)?),
+            desc::Reflectance::Metal(metal) => {
+                let [eta, k] = complex_index(*metal).map(|c| Tint::Constant(Rgb::from(c)));
+                Reflectance::Complex { eta, k }
+            }
+            desc::Reflectance::Complex { eta, k } => Reflectance::Complex {
+                eta: self.tint(eta)?,
+                k: self.tint(k)?,
+            },
+            desc::Reflectance::Schlick { f0 } => Reflectance::Schlick(self.tint(f0)?),
+            desc::Reflectance::F82 { f0, f82 } => Reflectance::F82 {
+                f0: self.tint(f0)?,
+                f82: self.tint(f82)?,
+            },
+            desc::Reflectance::EdgeTint { f0, tint } => Reflectance::EdgeTint {
+                f0: self.tint(f0)?,
+                tint: self.tint(tint)?,
+            },
+        })
+    }
+
+    fn rough(&mut self, rough: &desc::Rough, facet: Facet) -> Result<Leaf, MaterialError> {
+        let (roughness, isotropic) = match &rough.roughness {
+            desc::Roughness::Alpha(alpha) => {
+                let alpha = self.number(alpha)?;
+                (Roughness::Alpha(alpha, alpha), true)
+            }
+            desc::Roughness::AlphaXy { x, y } => {
+                let (x, y) = (self.number(x)?, self.number(y)?);
+                (Roughness::Alpha(x, y), x == y)
+            }
+            desc::Roughness::Blender {
+                roughness,
+                anisotropy,
+            } => {
+                let anisotropy = self.number(anisotropy)?;
+                let roughness = self.number(roughness)?;
+                let isotropic = anisotropy.is(0.0);
+                (
+                    Roughness::Blender {
+                        roughness,
+                        anisotropy,
+                    },
+                    isotropic,
+                )
+            }
+        };
+        let tangent = self.tangent(rough.tangent, isotropic);
+        let method = self.method(rough.scattering, rough.distribution, facet)?;
+        self.need_if(
+            Features::MULTIPLE_SCATTERING,
+            method.is_multiple() && !roughness.is_smooth(),
+        );
+        self.need_if(rough.distribution.feature(), true);
+        self.need_if(facet.kind().feature(), true);
+        Ok(Leaf::Rough(RoughMaterial {
+            distribution: rough.distribution,
+            roughness,
+            rotation: self.number(&rough.rotation)?,
+            tangent,
+            facet,
+            method,
+        }))
+    }
+
+    fn principled(&mut self, node: &desc::Principled) -> Result<Leaf, MaterialError> {
+        self.need_if(
+            Features::PRINCIPLED
+                .with(Features::MIXES)
+                .with(Features::METALS),
+            true,
+        );
+        match &node.sockets {
+            desc::Sockets::V3(sockets) => self.principled3(node, sockets),
+            desc::Sockets::V4(sockets) => self.principled4(node, sockets),
+        }
+    }
+
+    /// What both nodes share; `glass` is how the facets of glass scatter.
+    fn setup(
+        &mut self,
+        node: &desc::Principled,
+        isotropic: bool,
+        once: Method,
+        ior: Number,
+        transmits: bool,
+    ) -> Result<Setup, MaterialError> {
+        let white = Tint::Constant(Rgb::ONE);
+        let (reflecting, glass) = if node.multiple {
+            let method = |facet| self.method(desc::Scattering::Multiple, Distribution::Ggx, facet);
+            let reflecting = method(Facet::Metal(Reflectance::Constant(white)))?;
+            let glass = if transmits {
+                method(Facet::Glass(ior, white))?
+            } else {
+                Method::Single
+            };
+            (reflecting, Some(glass))
+        } else {
+            (once, None)
+        };
+        self.need_if(Features::MULTIPLE_SCATTERING, reflecting.is_multiple());
+        self.need_if(
+            Features::TRANSMISSION.with(Features::SPLIT_GLASS),
+            transmits,
+        );
+        Ok(Setup {
+            tangent: self.tangent(node.tangent, isotropic),
+            reflecting,
+            glass,
+            rises: Rises::of_ggx(),
+        })
+    }
+
+    fn principled3(
+        &mut self,
+        node: &desc::Principled,
+        sockets: &desc::Principled3,
+    ) -> Result<Leaf, MaterialError> {
+        let alpha = self.number(&sockets.alpha)?;
+        self.need_if(Features::TRANSPARENCY, !alpha.is(1.0));
+        self.need_if(Features::DIFFUSERS, true);
+        let anisotropic = self.number(&sockets.anisotropic)?;
+        let ior = self.number(&sockets.ior)?;
+        let transmission = self.number(&sockets.transmission)?;
+        let subsurface = self.number(&sockets.subsurface)?;
+        if !subsurface.is(0.0) {
+            self.note("subsurface scattering is a diffuse base of the same colour");
+        }
+        let transmits = !transmission.is(0.0);
+        let setup = self.setup(node, anisotropic.is(0.0), Method::Separable, ior, transmits)?;
+        Ok(Leaf::Principled3(Box::new(Principled3 {
+            setup,
+            base_color: self.tint(&sockets.base_color)?,
+            subsurface,
+            subsurface_color: self.tint(&sockets.subsurface_color)?,
+            metallic: self.number(&sockets.metallic)?,
+            specular: self.number(&sockets.specular)?,
+            specular_tint: self.number(&sockets.specular_tint)?,
+            roughness: self.number(&sockets.roughness)?,
+            anisotropic,
+            anisotropic_rotation: self.number(&sockets.anisotropic_rotation)?,
+            sheen: self.number(&sockets.sheen)?,
+            sheen_tint: self.number(&sockets.sheen_tint)?,
+            clearcoat: self.number(&sockets.clearcoat)?,
+            clearcoat_roughness: self.number(&sockets.clearcoat_roughness)?,
+            ior,
+            transmission,
+            transmission_roughness: self.number(&sockets.transmission_roughness)?,
+            emission: self.tint(&sockets.emission)?,
+            emission_strength: self.number(&sockets.emission_strength)?,
+            alpha,
+        })))
+    }
+
+    fn principled4(
+        &mut self,
+        node: &desc::Principled,
+        sockets: &desc::Principled4,
+    ) -> Result<Leaf, MaterialError> {
+        let alpha = self.number(&sockets.alpha)?;
+        self.need_if(Features::TRANSPARENCY, !alpha.is(1.0));
+        let anisotropic = self.number(&sockets.anisotropic)?;
+        let ior = self.number(&sockets.ior)?;
+        let transmission_weight = self.number(&sockets.transmission_weight)?;
+        let diffuse_roughness = self.number(&sockets.diffuse_roughness)?;
+        self.need_if(Features::DIFFUSERS, !diffuse_roughness.is(0.0));
+        if sockets.subsurface_weight != desc::Scalar::Value(0.0) {
+            self.note("subsurface scattering is a diffuse base of the same colour");
+        }
+        if sockets.sheen_weight != desc::Scalar::Value(0.0) {
+            self.note("the sheen of Cycles 4 and later is left out");
+        }
+        let transmits = !transmission_weight.is(0.0);
+        let setup = self.setup(node, anisotropic.is(0.0), Method::Single, ior, transmits)?;
+        let leaf = Principled4 {
+            setup,
+            base_color: self.tint(&sockets.base_color)?,
+            metallic: self.number(&sockets.metallic)?,
+            roughness: self.number(&sockets.roughness)?,
+            ior,
+            alpha,
+            diffuse_roughness,
+            specular_ior_level: self.number(&sockets.specular_ior_level)?,
+            specular_tint: self.tint(&sockets.specular_tint)?,
+            anisotropic,
+            anisotropic_rotation: self.number(&sockets.anisotropic_rotation)?,
+            transmission_weight,
+            coat_weight: self.number(&sockets.coat_weight)?,
+            coat_roughness: self.number(&sockets.coat_roughness)?,
+            coat_ior: self.number(&sockets.coat_ior)?,
+            coat_tint: self.tint(&sockets.coat_tint)?,
+            emission_color: self.tint(&sockets.emission_color)?,
+            emission_strength: self.number(&sockets.emission_strength)?,
+        };
+        let shines = !leaf.emission_strength.is(0.0);
+        self.need_if(Features::VIEW_DEPENDENT, shines && leaf.is_coated());
+        Ok(Leaf::Principled4(Box::new(leaf)))
+    }
+
+    /// Keeps what people are told of a material that is rendered otherwise than
+    /// it says.
+    fn note(&mut self, note: &'static str) {
+        if !self.needs.notes.contains(&note) {
+            self.needs.notes.push(note);
+        }
+    }
+
+    fn tangent(&mut self, tangent: desc::Tangent, isotropic: bool) -> Tangent {
+        if isotropic {
+            return Tangent::Any;
+        }
+        self.need_if(Features::ANISOTROPY, true);
+        match tangent {
+            desc::Tangent::Uv => {
+                self.needs.uvs = true;
+                Tangent::Uv
+            }
+            desc::Tangent::Radial(axis) => Tangent::Radial(axis),
+        }
+    }
+
+    /// The estimator for facets: what the file insists on, or for `auto` the one
+    /// that measured best for them (docs/estimators.md). The position-free
+    /// estimator is for conductors; where it does not exist, two walks do the
+    /// work. Orders above the first are thinned where they are faint, which is
+    /// decided at every hit: roughness may have a texture, and angles count.
+    fn method(
+        &self,
+        scattering: desc::Scattering,
+        distribution: Distribution,
+        facet: Facet,
+    ) -> Result<Method, MaterialError> {
+        let metal = matches!(facet, Facet::Metal(_));
+        Ok(match (scattering, self.estimator) {
+            (desc::Scattering::Single, _) | (_, desc::Estimator::Single) => Method::Single,
+            (_, desc::Estimator::Walk) => Method::Multiple(model::Estimator::Walk),
+            (_, desc::Estimator::TwoWalk) => Method::Multiple(model::Estimator::TwoWalk),
+            (_, desc::Estimator::PositionFree) if metal => {
+                Method::Multiple(model::Estimator::PositionFree)
+            }
+            (_, desc::Estimator::PositionFree) => Method::Multiple(model::Estimator::TwoWalk),
+            (_, desc::Estimator::Auto) => match facet {
+                Facet::Metal(_) => Method::Thinned(model::Estimator::PositionFree),
+                Facet::Glass(..) | Facet::Refraction(..) => {
+                    Method::Thinned(model::Estimator::TwoWalk)
+                }
+                // Their first order is no cheaper than a step of a walk.
+                Facet::Matte(_) => Method::Multiple(model::Estimator::TwoWalk),
+            },
+            (_, desc::Estimator::Compensated) => {
+                let white = match facet {
+                    Facet::Metal(_) => WhiteFacets::Conductor,
+                    Facet::Glass(Number::Constant(ior), _) => WhiteFacets::Dielectric(ior),
+                    Facet::Glass(..) => return Err(MaterialError::TexturedIndex),
+                    // There is no white one: total reflection absorbs.
+                    Facet::Refraction(..) => return Ok(Method::Single),
+                    Facet::Matte(_) => WhiteFacets::Diffuse,
+                };
+                Method::Compensated(Albedos::of(distribution, white))
+            }
+        })
+    }
+}
+
+/// η and k of a metal for red, green and blue (650, 550 and 450 nm), rounded
+/// from published measurements.
+fn complex_index(metal: desc::Metal) -> [[f32; 3]; 2] {
+    match metal {
+        desc::Metal::Gold => [[0.183, 0.421, 1.373], [3.424, 2.346, 1.770]],
+        desc::Metal::Silver => [[0.159, 0.145, 0.135], [3.929, 3.190, 2.381]],
+        desc::Metal::Copper => [[0.271, 0.677, 1.316], [3.609, 2.625, 2.292]],
+        desc::Metal::Aluminium => [[1.346, 0.965, 0.617], [7.475, 6.400, 5.303]],
+        desc::Metal::Iron => [[2.911, 2.950, 2.585], [3.089, 2.932, 2.767]],
+        desc::Metal::Chromium => [[3.107, 3.181, 2.323], [3.331, 3.329, 3.135]],
+    }
+}

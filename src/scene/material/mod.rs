@@ -1,0 +1,292 @@
+//! Materials as they are rendered: flat lists of closures whose parameters are
+//! numbers or texture indices.
+
+mod factor;
+mod principled;
+mod rough;
+mod value;
+
+pub use factor::Factor;
+pub use principled::{Principled3, Principled4, Setup};
+pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
+pub use value::{Number, Point, Tint};
+
+use arrayvec::ArrayVec;
+use glam::Vec3;
+
+use super::{Surface, View};
+use crate::bsdf::{
+    Bsdf, Closure, Diffuser, Frame, Lambert, MAX_CLOSURES, OrenNayar, WeightedClosure,
+};
+use crate::color::Rgb;
+use crate::description::Version;
+use crate::features::{Features, has};
+use crate::texture::Texture;
+
+/// One leaf of a mix.
+#[derive(Clone, Debug)]
+pub enum Leaf {
+    /// Lambert's law.
+    Lambert(Tint),
+    /// Oren and Nayar's, of a roughness and by the formula of a version of Cycles.
+    OrenNayar(Tint, Number, Version),
+    /// Lambert's law, to the other side.
+    Translucent(Tint),
+    /// Ashikhmin's velvet: colour and σ.
+    Velvet(Tint, Number),
+    /// Straight through.
+    Transparent(Tint),
+    /// A microsurface.
+    Rough(RoughMaterial),
+    /// Radiance colour · strength on both sides, W·m⁻²·sr⁻¹.
+    Emission(Tint, Number),
+    /// The node of Blender 2.8 to 3.6.
+    Principled3(Box<Principled3>),
+    /// The node of Blender 4 and 5.
+    Principled4(Box<Principled4>),
+}
+
+/// A leaf with the product of mix factors above it.
+#[derive(Clone, Debug)]
+pub struct WeightedLeaf {
+    /// The constant part of the product.
+    pub share: f32,
+    /// Other factors; `true` takes one minus the factor.
+    pub factors: ArrayVec<(Factor, bool), MAX_CLOSURES>,
+    /// The leaf.
+    pub leaf: Leaf,
+}
+
+impl WeightedLeaf {
+    #[inline]
+    fn share_at<const F: u32>(&self, point: &Point<'_>) -> f32 {
+        self.factors
+            .iter()
+            .fold(self.share, |share, (factor, complement)| {
+                let f = factor.at::<F>(point);
+                share * if *complement { 1.0 - f } else { f }
+            })
+    }
+}
+
+/// A material: at most [`MAX_CLOSURES`] closures.
+#[derive(Clone, Debug, Default)]
+pub struct Material {
+    /// The leaves of the mix; one for a plain material.
+    pub leaves: Vec<WeightedLeaf>,
+}
+
+impl Material {
+    /// The closures at a point, weighted for who looks at it.
+    #[must_use]
+    #[inline]
+    pub fn bsdf<const F: u32>(
+        &self,
+        textures: &[Texture],
+        surface: &Surface,
+        view: View,
+    ) -> Bsdf<F> {
+        let mut bsdf = Bsdf::new(surface.geometric_normal);
+        let most = if has::<F>(Features::MIXES) {
+            MAX_CLOSURES
+        } else {
+            1
+        };
+        let point = Point::shaded(textures, surface, view);
+        for weighted in self.leaves.iter().take(most) {
+            let share = if has::<F>(Features::MIXES) {
+                weighted.share_at::<F>(&point)
+            } else {
+                1.0
+            };
+            let isotropic = || Frame::about(surface.normal);
+            let (closure, frame) = match &weighted.leaf {
+                Leaf::Emission(..) => continue,
+                Leaf::Lambert(tint) => {
+                    let albedo = tint.at::<F>(&point);
+                    (Closure::Lambert(Lambert { albedo }), isotropic())
+                }
+                // What goes straight through does so by the true surface: an
+                // interpolated normal may face away from the viewer.
+                Leaf::Transparent(tint) => (
+                    Closure::Transparent(tint.at::<F>(&point)),
+                    Frame::about(surface.geometric_normal),
+                ),
+                Leaf::Rough(rough) => (
+                    rough.closure::<F>(&point),
+                    rough.tangent.frame::<F>(rough.rotation, &point, surface),
+                ),
+                Leaf::Principled3(node) if has::<F>(Features::PRINCIPLED) => {
+                    node.add(&mut bsdf, &point, surface, share);
+                    continue;
+                }
+                Leaf::Principled4(node) if has::<F>(Features::PRINCIPLED) => {
+                    node.add(&mut bsdf, &point, surface, share);
+                    continue;
+                }
+                leaf if has::<F>(Features::DIFFUSERS) => {
+                    match leaf.diffuser::<F>(&point, isotropic().to_local(view.wo)) {
+                        Some(lobe) => (Closure::Diffuser(lobe), isotropic()),
+                        None => continue,
+                    }
+                }
+                _ => value::left_out(),
+            };
+            bsdf.push(WeightedClosure {
+                weight: Rgb::splat(share),
+                chance: share,
+                frame,
+                closure,
+            });
+        }
+        bsdf
+    }
+
+    /// The closures of a horizontal surface whose tangent is along x, seen from
+    /// `wo`, above or below: what measurements of a material without textures
+    /// look at.
+    #[must_use]
+    pub fn horizontal(&self, wo: Vec3) -> Bsdf {
+        let view = View { wo, camera: false };
+        self.bsdf(&[], &Surface::horizontal(wo.z > 0.0), view)
+    }
+
+    /// The radiance that leaves the point towards the viewer, W·m⁻²·sr⁻¹.
+    #[must_use]
+    pub fn emission(&self, point: &Point<'_>) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for weighted in &self.leaves {
+            let share = || weighted.share_at::<ALL>(point);
+            sum += match &weighted.leaf {
+                Leaf::Emission(tint, strength) => {
+                    tint.at::<ALL>(point) * (strength.at::<ALL>(point).max(0.0) * share())
+                }
+                Leaf::Principled3(node) => node.emission::<ALL>(point) * share(),
+                Leaf::Principled4(node) => node.emission::<ALL>(point) * share(),
+                _ => continue,
+            };
+        }
+        sum
+    }
+
+    /// What it shines on average, W·m⁻²·sr⁻¹: textures by their mean, factors that
+    /// differ from point to point by one half.
+    #[must_use]
+    pub fn mean_emission(&self, textures: &[Texture]) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for weighted in &self.leaves {
+            let Some((tint, strength)) = weighted.leaf.shines() else {
+                continue;
+            };
+            let factors: f32 = weighted
+                .factors
+                .iter()
+                .map(|(factor, complement)| {
+                    let f = factor.typical();
+                    if *complement { 1.0 - f } else { f }
+                })
+                .product();
+            sum += tint.mean(textures) * (strength.mean(textures) * weighted.share * factors);
+        }
+        sum
+    }
+
+    /// Whether any leaf shines.
+    #[must_use]
+    pub fn emits(&self) -> bool {
+        self.leaves
+            .iter()
+            .any(|weighted| weighted.leaf.shines().is_some())
+    }
+
+    /// Whether light may reach it from behind.
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        self.leaves.iter().any(|weighted| match &weighted.leaf {
+            Leaf::Rough(rough) => matches!(rough.facet, Facet::Glass(..) | Facet::Refraction(..)),
+            Leaf::Principled3(node) => !node.transmission.is(0.0),
+            Leaf::Principled4(node) => !node.transmission_weight.is(0.0),
+            Leaf::Translucent(_) => true,
+            _ => false,
+        })
+    }
+
+    /// Whether a tangent runs round an axis of the object.
+    #[must_use]
+    pub fn has_radial_tangent(&self) -> bool {
+        self.leaves.iter().any(|l| match &l.leaf {
+            Leaf::Rough(rough) => matches!(rough.tangent, Tangent::Radial(_)),
+            Leaf::Principled3(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
+            Leaf::Principled4(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
+            _ => false,
+        })
+    }
+
+    /// The colour that a noise filter or a compositor takes for the albedo.
+    #[must_use]
+    pub fn albedo(&self, point: &Point<'_>) -> Rgb {
+        let color = |leaf: &Leaf| match leaf {
+            Leaf::Lambert(tint)
+            | Leaf::OrenNayar(tint, ..)
+            | Leaf::Translucent(tint)
+            | Leaf::Velvet(tint, _)
+            | Leaf::Transparent(tint) => tint.at::<ALL>(point),
+            Leaf::Emission(..) => Rgb::ZERO,
+            Leaf::Rough(rough) => rough.albedo::<ALL>(point),
+            Leaf::Principled3(node) => node.base_color.at::<ALL>(point),
+            Leaf::Principled4(node) => node.base_color.at::<ALL>(point),
+        };
+        self.leaves
+            .iter()
+            .map(|l| color(&l.leaf) * l.share_at::<ALL>(point))
+            .sum()
+    }
+}
+
+impl Leaf {
+    /// How many closures it comes to at the most; what shines takes a place, too.
+    #[must_use]
+    pub fn most_closures(&self) -> usize {
+        match self {
+            Self::Principled3(node) => node.most_closures(),
+            Self::Principled4(node) => node.most_closures(),
+            _ => 1,
+        }
+    }
+
+    /// The colour and strength of what it shines; `None` if it does not.
+    fn shines(&self) -> Option<(Tint, Number)> {
+        let (tint, strength) = match self {
+            Self::Emission(tint, strength) => (*tint, *strength),
+            Self::Principled3(node) => (node.emission, node.emission_strength),
+            Self::Principled4(node) => (node.emission_color, node.emission_strength),
+            _ => return None,
+        };
+        (!strength.is(0.0) && tint != Tint::Constant(Rgb::ZERO)).then_some((tint, strength))
+    }
+
+    /// The wide lobe of such a leaf at a point seen from `wo`, in the local frame.
+    fn diffuser<const F: u32>(&self, point: &Point<'_>, wo: Vec3) -> Option<Diffuser> {
+        Some(match self {
+            Self::OrenNayar(tint, roughness, version) => {
+                let (albedo, roughness) = (tint.at::<F>(point), roughness.share::<F>(point));
+                Diffuser::OrenNayar(match version {
+                    Version::V3_4 => OrenNayar::of_cycles_3(albedo, roughness),
+                    Version::V4_5 | Version::V5_0 => OrenNayar::of_cycles_4(albedo, roughness, wo),
+                })
+            }
+            Self::Translucent(tint) => Diffuser::Translucent(tint.at::<F>(point)),
+            Self::Velvet(tint, sigma) => Diffuser::Velvet {
+                color: tint.at::<F>(point),
+                steepness: sigma.at::<F>(point).max(LEAST_SIGMA).powi(-2),
+            },
+            _ => return None,
+        })
+    }
+}
+
+/// The least σ of velvet, as in Cycles.
+const LEAST_SIGMA: f32 = 0.01;
+
+/// For what is asked for too seldom to be compiled for each kernel.
+const ALL: u32 = Features::EVERYTHING.bits();
