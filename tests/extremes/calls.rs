@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use smithwalk_model::*;
 
 /// From this order on, a walk may end by roulette alone and its weight exceed 1.
-const LONG: u32 = 4096;
+const LONG: u32 = 1 << 14;
 
-/// A walk gets to order n > 4096 with a chance of (4096/n)³ at most, and draws
-/// six numbers a step; two walks a call. So 100 times 4096 orders have a
-/// chance of 2e-6 per call that gets past 4096, of which a grid has hundreds.
-const MOST_DRAWS: usize = 6 * 100 * LONG as usize;
+/// A walk gets to order n > 16384 with a chance of (16384/n)² at most, and draws six
+/// numbers a step; two walks a call. So 1000 times 16384 orders have a chance of 2e-6 per
+/// call that gets past 16384, of which a grid has hundreds.
+const MOST_DRAWS: usize = 6 * 1000 * LONG as usize;
 
 /// On surfaces of α ≤ 1 a walk meets two facets or three on average, and its
 /// order falls off exponentially: 100 orders of six draws, in two walks, are

@@ -49,25 +49,25 @@ fn sampled<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>>(
 }
 
 /// Walks of thousands of orders end by roulette alone, and it keeps the mean:
-/// nothing is lost on diffuse facets of α = 100, whose walks take tens of
-/// thousands of orders without it.
+/// nothing is lost on diffuse facets of α = 100 and 300, whose walks take 2·10³ and
+/// 2·10⁴ orders on average without it, and are told by standard errors of 0.2 and 4 %.
 #[test]
 fn roulette_keeps_the_mean_of_the_longest_walks() {
     let mut longest = 0;
-    for (k, alpha) in [100.0f32, 1000.0].into_iter().enumerate() {
+    for (k, alpha) in [100.0f32, 300.0].into_iter().enumerate() {
         let surface = Microsurface {
             ndf: Ggx::isotropic(alpha),
             facets: Diffuse {
                 albedo: Rgb::white(),
             },
         };
-        let exits = sampled(&surface, Vector3::spherical(0.6, 0.0), k as u64, 50_000);
+        let exits = sampled(&surface, Vector3::spherical(0.6, 0.0), k as u64, 10_000);
         let mean = Mean::of(
             exits
                 .iter()
                 .map(|e| e.map_or(0.0, |e| e.weight.0[0].into())),
         );
-        let beyond = exits.iter().flatten().filter(|e| e.order > 4096).count();
+        let beyond = exits.iter().flatten().filter(|e| e.order > 1 << 14).count();
         longest = exits
             .iter()
             .flatten()
@@ -75,13 +75,13 @@ fn roulette_keeps_the_mean_of_the_longest_walks() {
             .max()
             .max(Some(longest))
             .unwrap_or(0);
-        println!("diffuse α {alpha}: {mean:?}, {beyond} of 50000 beyond 4096 orders");
+        println!("diffuse α {alpha}: {mean:?}, {beyond} of 10000 beyond 16384 orders");
         assert!(beyond > 50, "α {alpha}: no long walks to judge by");
         // Two comparisons: false alarm 1 in 1000.
         let score = (mean.value - 1.0) / mean.error;
         assert!(score.abs() < bound(2), "α {alpha}: {mean:?}");
     }
-    assert!(longest > 8192, "{longest}");
+    assert!(longest > 1 << 15, "{longest}");
 }
 
 /// Dark walks play from the third order on, once their weight is below 1/16.

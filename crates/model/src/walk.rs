@@ -29,18 +29,20 @@ impl Roulette {
     };
 }
 
-/// From this order on a walk plays whatever its weight, and reaches order n
-/// with probability (LONG/n)³: the expected number of steps of any walk is
-/// below 1.5·LONG, and the mean is kept. A chance that falls by a power leaves
-/// the weights a finite variance, as orders are exponentially distributed.
-/// Walks get here at α ≥ 10 alone.
-const LONG: u32 = 4096;
+/// From this order on a walk plays whatever its weight, and reaches order n with
+/// probability (LONG/n)²: the expected number of steps of any walk is below 2·LONG, and
+/// the mean is kept. Orders are exponentially distributed, so a chance that falls by a
+/// power leaves the weights a finite variance; the lower the power and the later it
+/// begins, the lighter their tail. Of diffuse facets with α = 300, which walks leave
+/// after 2·10⁴ orders on average, the mean weight has a relative standard error of
+/// 5/√walks. Walks get here at α ≥ 50 alone.
+const LONG: u32 = 1 << 14;
 
 /// The chance with which a walk goes on from `order`, if it is that long.
 #[inline]
 pub(super) fn chance_of_long(order: u32) -> Option<f64> {
     let n = f64::from(order);
-    (order >= LONG).then(|| (n / (n + 1.0)).powi(3))
+    (order >= LONG).then(|| (n / (n + 1.0)).powi(2))
 }
 
 /// Light on its way.
