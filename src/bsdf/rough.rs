@@ -144,20 +144,29 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
 
     /// How often orders above the first are evaluated. Their share goes with
     /// the chance to meet a second facet, Λ, along the most grazing direction
-    /// that one facet can well turn the light to.
+    /// that one facet can well turn the light to: where normals are spread
+    /// unevenly, towards the rougher axis.
     #[inline]
     fn chance(&self, wo: Vector3<f32>, wi: Vector3<f32>) -> f32 {
         let low = if wo.z < wi.z.abs() { wo } else { wi };
         let across = low.x.hypot(low.y);
-        let up = low.z.abs() - TURN * self.surface.ndf.width() * across;
+        let [alpha_x, alpha_y] = self.surface.ndf.alphas();
+        let up = low.z.abs() - TURN * alpha_x.max(alpha_y) * across;
         if up <= 0.0 {
             return 1.0;
         }
         let grazing = if up < INSIDE {
             let stretch = (1.0 - up * up).sqrt() / across;
+            let (x, y) = if alpha_x == alpha_y {
+                (low.x, low.y)
+            } else if alpha_x > alpha_y {
+                (across, 0.0)
+            } else {
+                (0.0, across)
+            };
             Vector3 {
-                x: low.x * stretch,
-                y: low.y * stretch,
+                x: x * stretch,
+                y: y * stretch,
                 z: up,
             }
         } else {

@@ -16,8 +16,15 @@ pub trait Width: Ndf<Scalar = f32> {
     /// With these slope roughnesses along x and y.
     fn of(alpha_x: f32, alpha_y: f32) -> Self;
 
+    /// The slope roughnesses along x and y.
+    fn alphas(&self) -> [f32; 2];
+
     /// The α of the isotropic surface that is about as rough.
-    fn width(&self) -> f32;
+    #[inline]
+    fn width(&self) -> f32 {
+        let [x, y] = self.alphas();
+        (x * y).sqrt()
+    }
 }
 
 /// Declares distributions with the feature that each needs beside those of its
@@ -110,8 +117,8 @@ macro_rules! distributions {
             }
 
             #[inline]
-            fn width(&self) -> f32 {
-                (self.alpha_x * self.alpha_y).sqrt()
+            fn alphas(&self) -> [f32; 2] {
+                [self.alpha_x, self.alpha_y]
             }
         })*
 
