@@ -3,6 +3,7 @@
 mod albedo;
 mod eval;
 mod sample;
+mod tail;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -24,10 +25,14 @@ pub enum Command {
     Sample(sample::Args),
 }
 
-pub fn run(command: &Command, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
+pub fn run(
+    command: &Command,
+    out: &mut dyn Write,
+    log: &mut dyn Write,
+) -> anyhow::Result<ExitCode> {
     match command {
         Command::Albedo(args) => albedo::run(args, out)?,
-        Command::Eval(args) => eval::run(args, out)?,
+        Command::Eval(args) => eval::run(args, out, log)?,
         Command::Sample(args) => sample::run(args, out)?,
     }
     Ok(ExitCode::SUCCESS)
@@ -77,18 +82,28 @@ fn parse_direction(text: &str) -> Result<Vec3, String> {
     let [x, y, z] = parts[..] else {
         return Err("expected three numbers, x,y,z".to_owned());
     };
-    Vec3::new(x, y, z)
-        .as_dvec3()
-        .try_normalize()
-        .map(|v| v.as_vec3())
-        .ok_or_else(|| "the direction has no length".to_owned())
+    let direction = Vec3::new(x, y, z).as_dvec3().try_normalize();
+    let direction = direction.ok_or_else(|| "the direction has no length".to_owned())?;
+    if direction.z.abs() <= LEVEL {
+        return Err(format!(
+            "the direction is level: materials scatter nothing within {LEVEL:e} of the horizon"
+        ));
+    }
+    Ok(direction.as_vec3())
 }
 
-/// Mean and standard error of colours, summed in f64.
+/// Materials take directions of this cosine and below as inside the surface.
+const LEVEL: f64 = 1e-7;
+
+/// The most samples that a command takes: those of days.
+const MOST_SAMPLES: u64 = 100_000_000_000;
+
+/// Mean, standard error and largest channels of colours, summed in f64.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     sum: [f64; 3],
     squares: [f64; 3],
+    largest: [f64; 3],
 }
 
 impl Moments {
@@ -97,6 +112,7 @@ impl Moments {
             let x = f64::from(x);
             self.sum[channel] += x;
             self.squares[channel] += x * x;
+            self.largest[channel] = self.largest[channel].max(x);
         }
     }
 
@@ -104,6 +120,7 @@ impl Moments {
         for channel in 0..3 {
             self.sum[channel] += other.sum[channel];
             self.squares[channel] += other.squares[channel];
+            self.largest[channel] = self.largest[channel].max(other.largest[channel]);
         }
     }
 

@@ -52,7 +52,7 @@ impl Cli {
             Command::Converge(args) => converge::run(args, out, log),
             Command::Furnace(args) => furnace::run(args, out, log),
             Command::Validate(args) => validate::run(args, out, log),
-            Command::Bsdf(command) => bsdf::run(command, out),
+            Command::Bsdf(command) => bsdf::run(command, out, log),
         }
     }
 }

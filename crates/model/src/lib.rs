@@ -116,7 +116,8 @@ pub struct Exit<F> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Estimator {
     /// One walk from ω_i, connected to ω_o at every facet (Heitz et al. 2016,
-    /// § 4.3): the reference for the others.
+    /// § 4.3). Unbounded: where the paths that matter begin with a rare facet,
+    /// the standard error of its mean says little.
     Walk,
     /// The first order in closed form; higher ones from a walk on either
     /// side, combined by the balance heuristic. Bounded.

@@ -9,7 +9,7 @@ use smithwalk::bsdf::Bsdf;
 use smithwalk::description::Estimator;
 use smithwalk_model::Draw;
 
-use super::{MaterialArgs, Moments};
+use super::{LEVEL, MOST_SAMPLES, MaterialArgs, Moments};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -19,17 +19,26 @@ pub struct Args {
     #[arg(long, value_name = "C,…", value_delimiter = ',', required = true, value_parser = parse_cosine, allow_hyphen_values = true)]
     cos: Vec<f32>,
     /// Azimuth of the viewing direction from the tangent, degrees
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_parser = parse_azimuth)]
     azimuth: f32,
     /// Walks per angle
-    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(2..=MOST_SAMPLES))]
     samples: u64,
 }
 
 fn parse_cosine(text: &str) -> Result<f32, String> {
     match text.trim().parse::<f32>() {
-        Ok(c) if c != 0.0 && (-1.0..=1.0).contains(&c) => Ok(c),
-        _ => Err("expected a cosine from -1 to 1, not 0".to_owned()),
+        Ok(c) if f64::from(c.abs()) > LEVEL && (-1.0..=1.0).contains(&c) => Ok(c),
+        _ => Err(format!(
+            "expected a cosine from -1 to 1, and not within {LEVEL:e} of the horizon, where materials scatter nothing"
+        )),
+    }
+}
+
+fn parse_azimuth(text: &str) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(degrees) if degrees.is_finite() => Ok(degrees),
+        _ => Err("expected a number of degrees".to_owned()),
     }
 }
 
