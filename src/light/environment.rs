@@ -7,15 +7,23 @@ use crate::texture::EnvironmentImage;
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
+/// The share of the mean luminance that light samples leave to BSDF samples.
+/// Less than 1, so that an image of one colour keeps a density.
+const LEFT_OUT: f64 = 0.5;
+
 /// An equirectangular image that shines.
 ///
 /// A world direction d is turned into d' = R·d and looked up at
 /// u = 0.5 − atan2(d'_y, d'_x)/2π, v = 0.5 + asin(d'_z)/π, bilinearly between
 /// texel centres, round the seam; v = 1 is the upper edge of the first row.
 ///
-/// Directions are chosen by texel, in proportion to the mean luminance of the
-/// bilinear image over the texel times its solid angle, and uniformly in solid
-/// angle within it, so that no direction that shines has density zero.
+/// Directions are chosen by texel, in proportion to its solid angle times what
+/// the mean luminance of the bilinear image over it exceeds [`LEFT_OUT`] of the
+/// image's mean by, and uniformly in solid angle within it. What is darker has
+/// density zero: BSDF samples find it, and have no rival there (MIS
+/// compensation, Karlík, Šik, Vévoda, Skřivan and Křivánek 2019, "MIS
+/// Compensation: Optimizing Sampling Techniques in Multiple Importance
+/// Sampling", section 4).
 #[derive(Clone, Debug)]
 pub struct Environment {
     width: usize,
@@ -53,27 +61,37 @@ impl Environment {
             .map(|row| (std::f64::consts::PI * (0.5 - row as f64 / height as f64)).sin())
             .collect();
 
-        let mut columns = Vec::with_capacity(width * height);
-        let mut row_weights = Vec::with_capacity(height);
-        let mut blurred = vec![0.0; width];
+        let solid_angle =
+            |y: usize| (sin_edges[y] - sin_edges[y + 1]) * std::f64::consts::TAU / width as f64;
         // The bound keeps sums finite.
         let shine =
             |x: usize, y: usize| luminance(Vec3::from(pixels[y * width + x]) * scale).min(1e30);
-        for y in 0..height {
+        let mut blurred = vec![0.0; width];
+        let mut row = vec![0.0; width];
+        let mut row_of = |y: usize, row: &mut [f64]| {
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
             for (x, value) in blurred.iter_mut().enumerate() {
                 *value = mean_of_bilinear(shine(x, above), shine(x, y), shine(x, below));
             }
-            let texel = |x: usize| {
+            for (x, mean) in row.iter_mut().enumerate() {
                 let (left, right) = ((x + width - 1) % width, (x + 1) % width);
-                f64::from(mean_of_bilinear(blurred[left], blurred[x], blurred[right]))
-            };
-            let row = select::accumulate((0..width).map(texel), &mut columns);
-            let solid_angle =
-                (sin_edges[y] - sin_edges[y + 1]) * std::f64::consts::TAU / width as f64;
-            row_weights.push(row.unwrap_or(0.0) * solid_angle);
+                *mean = mean_of_bilinear(blurred[left], blurred[x], blurred[right]).into();
+            }
+        };
+        let mut total = 0.0;
+        for y in 0..height {
+            row_of(y, &mut row);
+            total += row.iter().sum::<f64>() * solid_angle(y);
         }
-        let total: f64 = row_weights.iter().sum();
+        let left_out = LEFT_OUT * total / (4.0 * std::f64::consts::PI);
+        let mut columns = Vec::with_capacity(width * height);
+        let mut row_weights = Vec::with_capacity(height);
+        for y in 0..height {
+            row_of(y, &mut row);
+            let above = row.iter().map(|mean| (mean - left_out).max(0.0));
+            let sum = select::accumulate(above, &mut columns).unwrap_or(0.0);
+            row_weights.push(sum * solid_angle(y));
+        }
         let rows = select::Table::new(row_weights.into_iter())?;
         let mut guides = Vec::with_capacity(height * select::guide_length(width));
         for row in columns.chunks_exact(width) {

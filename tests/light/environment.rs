@@ -49,6 +49,28 @@ fn turned(image: EnvironmentImage, rotation: [f32; 3]) -> Environment {
     }
 }
 
+/// The irradiance on the side of `normal` by a light sample and a cosine sample
+/// each, with the power heuristic's weights: neither finds all light alone.
+fn by_both(lights: &Lights, normal: Vec3, n: usize, seed: u64) -> Estimate {
+    let mut rng = rng(seed);
+    let heuristic = |own: f64, other: f64| own * own / (own * own + other * other);
+    let cosine = |d: Vec3| f64::from(d.dot(normal).max(0.0)) / PI;
+    Estimate::of(n, || {
+        let light = lights.sample(Vec3::ZERO, 0.5, pair(&mut rng));
+        let sampled = light.map_or(0.0, |light| {
+            let (own, other) = (f64::from(light.pdf), cosine(light.direction));
+            f64::from(light.radiance.x) * PI * other / own * heuristic(own, other)
+        });
+        // On the unit sphere round the tip of the normal: Lambert's law.
+        let Some(towards) = (normal + direction(&mut rng)).try_normalize() else {
+            return sampled;
+        };
+        let (radiance, other) = lights.world(Vec3::ZERO, towards);
+        let own = cosine(towards);
+        sampled + f64::from(radiance.x) * PI * heuristic(own.max(1e-12), other.into())
+    })
+}
+
 #[test]
 fn texels_are_where_blender_has_them() {
     // 8 × 4 texels of their own colours: (column, row, 0) plus one.
@@ -96,7 +118,7 @@ fn a_grey_image_is_a_constant_world() {
     let pixels = vec![[1.0; 3]; 32 * 16];
     let environment = turned(image(32, 16, pixels), [0.0; 3]);
     let lights = lights(environment);
-    irradiance(&lights, Vec3::ZERO, Vec3::X, 200_000, 50).assert_is(PI, "a grey sky");
+    by_both(&lights, Vec3::X, 200_000, 50).assert_is(PI, "a grey sky");
     let (radiance, pdf) = lights.world(Vec3::ZERO, Vec3::new(0.6, 0.0, 0.8));
     assert_eq!(radiance, Vec3::ONE);
     assert!((f64::from(pdf) * 4.0 * PI - 1.0).abs() < 1e-4);
@@ -129,7 +151,7 @@ fn samples_agree_with_quadrature_and_their_density() {
         expected *= 4.0 * PI / f64::from(n * n);
         let lights = lights(environment);
         let name = format!("noise of {width} × {height}");
-        irradiance(&lights, Vec3::ZERO, normal, 400_000, 70).assert_is(expected, &name);
+        by_both(&lights, normal, 400_000, 70).assert_is(expected, &name);
 
         let mut directions = rng(71);
         Estimate::of(1_000_000, || {
@@ -152,8 +174,29 @@ fn samples_agree_with_quadrature_and_their_density() {
     }
 }
 
+/// Light samples leave to BSDF samples what is darker than half of the mean,
+/// and nothing else.
 #[test]
-fn nothing_that_shines_has_density_zero() {
+fn what_is_darker_than_half_of_the_mean_is_left_to_bsdf_samples() {
+    // Columns of 1, 3 and 8: 2 is half of their mean; four of each, so that
+    // interpolation leaves some texels alone.
+    let (width, height) = (12, 4);
+    let column = [1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 8.0, 8.0, 8.0, 8.0];
+    let pixels = (0..width * height)
+        .map(|i| [column[i % width]; 3])
+        .collect();
+    let lights = lights(unturned(width, height, pixels).unwrap());
+    let density = |column: usize| {
+        let azimuth = 2.0 * std::f32::consts::PI * (0.5 - (column as f32 + 0.5) / width as f32);
+        let (sin, cos) = azimuth.sin_cos();
+        lights.world(Vec3::ZERO, Vec3::new(cos, sin, 0.0)).1
+    };
+    assert_eq!(density(2), 0.0);
+    assert!((density(9) / density(5) - 6.0).abs() < 1e-3);
+}
+
+#[test]
+fn what_is_bright_has_a_density() {
     // One bright texel spreads by half a texel around through interpolation.
     let mut pixels = vec![[0.0; 3]; 16 * 8];
     pixels[3 * 16] = [1e6; 3];
