@@ -210,7 +210,7 @@ fn resume_goes_on_where_it_stopped() {
     let size = ["-D", "film.width=40", "-D", "film.height=40"];
     let runs = [
         ("3", parts, ""),
-        ("5", parts, "starting afresh"),
+        ("5", parts, "resuming at 3 samples"),
         ("12", parts, "resuming at 5 samples"),
         ("12", whole, ""),
     ];

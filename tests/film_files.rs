@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use smithwalk::film::{Aov, AovSet, Film, ResumeError, Sample, sidecar_path};
+use smithwalk::film::{Aov, AovSet, Film, FilmError, Identity, Sample, SavedFilm, sidecar_path};
 use smithwalk::image::{OutputError, OutputPath, Window, read_exr};
 use smithwalk::sampler::{Dimension, Sampler};
 
@@ -46,34 +46,42 @@ fn film() -> Film {
     Film::new(RESOLUTION, CROP, Aov::ALL.into_iter().collect())
 }
 
-/// Adds samples `from..to` of every pixel, some of them faulty.
-fn expose(film: &mut Film, from: u32, to: u32) {
+/// Adds samples up to `end` to every pixel, some of them faulty.
+fn expose(film: &mut Film, end: u32) {
     for tile in film.tiles_mut() {
-        for pixel in tile.window().pixels() {
-            for index in from..to {
-                assert_eq!(tile.samples(pixel), index);
-                let mut sampler = Sampler::new(5, pixel, index);
+        while tile.next() < end {
+            for pixel in tile.window().pixels() {
+                let mut sampler = Sampler::new(5, pixel, tile.next());
                 let u = sampler.get_4d(Dimension::bsdf(0));
                 let fault = u[3] < 0.01;
-                let sample = Sample {
-                    color: [u[0], if fault { f32::NAN } else { u[1] }, 1e4 * u[2]],
-                    albedo: [u[0], 0.5, 0.25],
-                    normal: [u[0] - 0.5, 0.0, 1.0],
-                    depth: (u[3] > 0.5).then_some(10.0 * u[3]),
-                    single: [u[0] * 0.5; 3],
-                    multiple: [u[1] * 0.5; 3],
-                };
+                let mut sample =
+                    Sample::of([u[0], if fault { f32::NAN } else { u[1] }, 1e4 * u[2]])
+                        .with(Aov::Albedo, [u[0], 0.5, 0.25])
+                        .with(Aov::Normal, [u[0] - 0.5, 0.0, 1.0])
+                        .with(Aov::Single, [u[0] * 0.5; 3])
+                        .with(Aov::Multiple, [u[1] * 0.5; 3]);
+                if u[3] > 0.5 {
+                    sample = sample.with(Aov::Depth, [10.0 * u[3]; 3]);
+                }
                 tile.add(pixel, &[sample]);
             }
+            tile.advance();
         }
     }
+}
+
+/// Whatever stands for a render.
+fn identity(seed: &str) -> Identity {
+    [("camera", "0f"), ("seed", seed)]
+        .map(|(name, value)| (name.to_owned(), value.to_owned()))
+        .into()
 }
 
 #[test]
 fn an_exr_comes_back_bit_by_bit() {
     let folder = Folder::new("exr");
     let mut film = film();
-    expose(&mut film, 0, 5);
+    expose(&mut film, 5);
     let mut image = film.develop();
     image.attributes = vec![
         ("smithwalk.scene".into(), "Grünspan.yaml".into()),
@@ -120,47 +128,89 @@ fn a_resumed_film_equals_an_uninterrupted_one() {
     assert!(path.ends_with("image.exr.film"));
 
     let mut first = film();
-    expose(&mut first, 0, 3);
-    first.save(&path, 42).unwrap();
+    expose(&mut first, 3);
+    // As an interrupted render leaves it: more in some tiles than in others.
+    let [tile, ..] = first.tiles_mut() else {
+        panic!("no tiles")
+    };
+    for pixel in tile.window().pixels() {
+        let u = Sampler::new(5, pixel, 3).get_4d(Dimension::bsdf(0));
+        tile.add(pixel, &[Sample::of([u[0]; 3])]);
+    }
+    tile.advance();
+    first.save(&path, &identity("1"), 8).unwrap();
     let mut resumed = film();
-    resumed.resume(&path, 42).unwrap();
+    let saved = SavedFilm::read(&path).unwrap();
+    resumed.resume(saved, &identity("1")).unwrap();
     assert!(resumed == first, "saving changed the film");
     assert_eq!(resumed.samples_per_pixel(), 3);
-    expose(&mut resumed, 3, 8);
 
+    expose(&mut first, 8);
+    expose(&mut resumed, 8);
+    assert!(resumed == first, "resuming changed the film");
+    assert!(!resumed.faults().is_empty(), "faults are part of the test");
+}
+
+/// Parts of any length, merged in any order, have the bits of the whole; the noise
+/// estimate, of sums in single precision, is that of the whole but for rounding.
+#[test]
+fn merged_parts_equal_the_whole() {
     let mut whole = film();
-    expose(&mut whole, 0, 8);
-    assert!(resumed == whole, "resuming changed the film");
-    assert!(!whole.faults().is_empty(), "faults are part of the test");
-    assert_eq!(resumed.relative_error(), whole.relative_error());
+    expose(&mut whole, 19);
+    let part = |start: u32, end: u32| {
+        let mut part = film();
+        part.set_share(start..end);
+        expose(&mut part, end);
+        part
+    };
+    let parts = [part(0, 5), part(5, 8), part(8, 17), part(17, 19)];
+    for order in [[0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]] {
+        let mut merged = parts[order[0]].clone();
+        let others = order[1..].iter().map(|&i| parts[i].clone());
+        merged.merge(&others.collect::<Vec<_>>()).unwrap();
+        assert_eq!(merged.common().to_string(), "0–18");
+        assert!(merged.develop() == whole.develop(), "{order:?}");
+        assert_eq!(merged.faults(), whole.faults());
+        let noise = [&merged, &whole].map(|film| film.relative_error().unwrap());
+        assert!((noise[0] / noise[1] - 1.0).abs() < 1e-5, "{noise:?}");
+    }
+    let mut overlapping = part(4, 6);
+    assert_eq!(overlapping.merge(&parts[..2]), Err([1, 0]));
 }
 
 #[test]
-fn a_film_of_another_render_is_refused() {
+fn a_film_of_another_render_is_refused_and_the_difference_named() {
     let folder = Folder::new("refuse");
     let path = folder.file("image.exr.film");
     let mut saved = film();
-    expose(&mut saved, 0, 2);
-    saved.save(&path, 42).unwrap();
+    expose(&mut saved, 2);
+    saved.save(&path, &identity("1"), 4).unwrap();
 
-    let differs = |film: &mut Film, fingerprint| {
+    let differs = |film: &mut Film, identity: &Identity| {
         let before = film.clone();
-        let error = film.resume(&path, fingerprint).unwrap_err();
+        let saved = SavedFilm::read(&path).unwrap();
+        let error = film.resume(saved, identity).unwrap_err();
         assert!(*film == before, "an error leaves the film alone");
-        assert!(matches!(error, ResumeError::OtherRender { .. }), "{error}");
+        assert!(matches!(error, FilmError::OtherRender { .. }), "{error}");
         error.to_string()
     };
-    assert!(differs(&mut film(), 43).contains("another scene"));
+    assert!(differs(&mut film(), &identity("2")).contains("seed 1, not 2"));
+    let mut renamed = identity("1");
+    renamed.insert("mesh `a`".to_owned(), "00".to_owned());
+    assert!(differs(&mut film(), &renamed).contains("no mesh `a`"));
     let mut full = Film::new(RESOLUTION, Window::full(RESOLUTION), film().aovs());
-    assert!(differs(&mut full, 42).contains("another resolution or crop"));
+    assert!(differs(&mut full, &identity("1")).contains("another resolution or crop"));
     let mut plain = Film::new(RESOLUTION, CROP, AovSet::NONE);
-    assert!(differs(&mut plain, 42).contains("other AOVs"));
+    assert!(differs(&mut plain, &identity("1")).contains("other AOVs"));
+    let mut part = film();
+    part.set_share(2..4);
+    assert!(differs(&mut part, &identity("1")).contains("samples 0–1"));
 
     // Every truncation and a flip of any bit in a sample of them is noticed.
     let good = std::fs::read(&path).unwrap();
     let refused = |bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        film().resume(&path, 42).is_err()
+        SavedFilm::read(&path).is_err()
     };
     for length in (0..good.len()).step_by(997) {
         assert!(refused(&good[..length]), "cut to {length} bytes");
@@ -169,6 +219,20 @@ fn a_film_of_another_render_is_refused() {
         let mut bytes = good.clone();
         bytes[position] ^= 1 << (position % 8);
         assert!(refused(&bytes), "bit flipped in byte {position}");
+    }
+    // A right checksum over content that no film can have must not panic either.
+    let content = good.len() - 16;
+    for position in (0..content).step_by(101) {
+        let mut bytes = good.clone();
+        bytes[position] = !bytes[position];
+        let sum = xxhash_rust::xxh3::xxh3_128(&bytes[..content]);
+        bytes[content..].copy_from_slice(&sum.to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        if let Ok(film) = SavedFilm::read(&path) {
+            let image = film.film.develop();
+            assert!(image.color.as_flattened().iter().all(|c| c.is_finite()));
+            let _ = film.film.relative_error();
+        }
     }
     assert!(!refused(&good));
 }
@@ -211,6 +275,53 @@ fn a_failed_write_keeps_the_older_file() {
     assert!(matches!(error, OutputError::Write { .. }), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert_eq!(folder.names(), ["image.exr"], "no leftovers");
+}
+
+/// Planted links in a shared folder lead nowhere, what a killed process has left is
+/// taken away, a link that is an output stays one, a pipe stays a pipe.
+#[cfg(unix)]
+#[test]
+fn temporary_files_follow_no_links_and_leave_nothing() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    let folder = Folder::new("links");
+    let image = film().develop();
+    let victim = folder.file("victim");
+    std::fs::write(&victim, "precious").unwrap();
+    symlink(&victim, folder.file(".image.exr.part")).unwrap();
+    let output = OutputPath::new(folder.file("image.exr")).unwrap();
+    output.check().unwrap();
+    symlink(&victim, folder.file(".image.exr.part")).unwrap();
+    output.write(&image, 0.0).unwrap();
+    assert_eq!(std::fs::read(&victim).unwrap(), b"precious");
+
+    std::fs::create_dir(folder.file("real")).unwrap();
+    std::fs::write(folder.file("real/there.exr"), "").unwrap();
+    symlink(folder.file("real/there.exr"), folder.file("link.exr")).unwrap();
+    let link = OutputPath::new(folder.file("link.exr")).unwrap();
+    link.write(&image, 0.0).unwrap();
+    assert!(folder.file("link.exr").is_symlink());
+    assert!(read_exr(&folder.file("real/there.exr")).unwrap().color == image.color);
+
+    let pipe = folder.file("pipe.png");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read(pipe).unwrap()
+    });
+    let output = OutputPath::new(&pipe).unwrap();
+    output.check().unwrap();
+    output.write(&image, 0.0).unwrap();
+    assert!(reader.join().unwrap().starts_with(b"\x89PNG"));
+    let kind = std::fs::symlink_metadata(&pipe).unwrap().file_type();
+    assert!(kind.is_fifo());
+
+    let mut names = folder.names();
+    names.sort();
+    assert_eq!(
+        names,
+        ["image.exr", "link.exr", "pipe.png", "real", "victim"]
+    );
 }
 
 #[test]

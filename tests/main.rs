@@ -14,6 +14,7 @@ mod diff;
 mod extreme_scenes;
 mod extremes;
 mod film_files;
+mod films;
 mod heightfield;
 mod inputs;
 mod light;

@@ -115,8 +115,11 @@ impl Prepared {
     fn new(args: &Args, estimator: EstimatorName, log: &mut dyn Write) -> anyhow::Result<Self> {
         let mut description = args.scene.describe()?;
         description.sampling.estimator = estimator.into();
-        let (scene, settings) = args.scene.resolve(&description, log)?;
-        let prepared = Self { scene, settings };
+        let resolved = args.scene.resolve(&description, log)?;
+        let prepared = Self {
+            scene: resolved.scene,
+            settings: resolved.settings,
+        };
         View::new(&prepared.scene, &prepared.settings)
             .with_context(|| args.scene.scene.display().to_string())?;
         Ok(prepared)

@@ -92,8 +92,8 @@ fn scene(
         color: [1.0; 3],
         strength: 1.0,
     });
-    let (scene, settings) = source.resolve(&description, log)?;
-    let result = rendered::render_furnace(&scene, settings, args.spp, args.seed)?;
+    let resolved = source.resolve(&description, log)?;
+    let result = rendered::render_furnace(&resolved.scene, resolved.settings, args.spp, args.seed)?;
     if args.json {
         writeln!(out, "{}", result.to_json())?;
     } else {

@@ -22,7 +22,7 @@ pub struct Args {
 pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
     let description = args.scene.describe()?;
     let start = std::time::Instant::now();
-    let (scene, _) = args.scene.resolve(&description, log)?;
+    let scene = args.scene.resolve(&description, log)?.scene;
     let seconds = start.elapsed().as_secs_f64();
     let kernel = KERNELS[kernel_for(scene.features)];
     if args.json {

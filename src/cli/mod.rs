@@ -3,8 +3,10 @@
 mod bsdf;
 mod converge;
 mod diff;
+mod film;
 mod furnace;
 mod info;
+mod merge;
 mod render;
 mod scene;
 mod validate;
@@ -27,6 +29,10 @@ pub struct Cli {
 enum Command {
     /// Render a scene to EXR or PNG
     Render(render::Args),
+    /// Put films that are parts of one render together to an image
+    Merge(merge::Args),
+    /// Show what a saved film holds
+    Film(film::Args),
     /// Show what a scene uses, what is left out, and what each costs
     Info(info::Args),
     /// Compare two images
@@ -47,6 +53,8 @@ impl Cli {
     pub fn run(&self, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
         match &self.command {
             Command::Render(args) => render::run(args, out, log),
+            Command::Merge(args) => merge::run(args, out, log),
+            Command::Film(args) => film::run(args, out),
             Command::Info(args) => info::run(args, out, log),
             Command::Diff(args) => diff::run(args, out),
             Command::Converge(args) => converge::run(args, out, log),

@@ -1,22 +1,27 @@
 //! `smithwalk render`.
 
-use std::io::{IsTerminal, Write};
+mod outputs;
+mod progress;
+mod signals;
+
+use std::io::Write;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use smithwalk::description::{Description, Estimator};
 use smithwalk::features::Features;
-use smithwalk::film::{Film, sidecar_path};
-use smithwalk::image::{OutputPath, Window};
-use smithwalk::integrator::{Control, Progress, RenderReport, Stop, begun, render};
-use smithwalk::scene::{Limits, RenderSettings, Scene};
+use smithwalk::film::{Film, SavedFilm};
+use smithwalk::image::Window;
+use smithwalk::integrator::{Checkpoint, Control, RenderReport, Stop, render};
+use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene};
 
 use super::scene::SceneArgs;
+use outputs::Outputs;
+use progress::{ProgressKind, Reporter};
+use signals::Signals;
 
 /// Samples per pixel beyond which only `--time` or `--noise` make sense.
 const MOST_SPP: u32 = 1 << 24;
@@ -25,14 +30,14 @@ const MOST_SPP: u32 = 1 << 24;
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Image to write, .exr (scene-linear) or .png; may be given several times [default: the scene's name with .exr and .png]
-    #[arg(short, long = "output", value_name = "OUT.exr|OUT.png")]
+    /// File to write: .exr (scene-linear), .png, or .film (all sums, for `merge` and --resume); may be given several times [default: the scene's name with .exr and .png]
+    #[arg(short, long = "output", value_name = "OUT.exr|OUT.png|OUT.film")]
     output: Vec<PathBuf>,
     /// Samples per pixel [default: the scene's; without limit if --time or --noise is given]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SPP)))]
     spp: Option<u32>,
     /// Stop after this many seconds
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     time: Option<f64>,
     /// Stop at this estimated relative error of the image, e.g. 0.02
     #[arg(long, value_name = "REL", value_parser = positive)]
@@ -49,6 +54,15 @@ pub struct Args {
     /// Go on from the samples of an earlier run
     #[arg(long)]
     resume: bool,
+    /// Save the samples so often on the way; 0: never
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = interval)]
+    checkpoint: f64,
+    /// Render this share of the samples of every pixel alone, I from 0 to N − 1, for `merge`
+    #[arg(long, value_name = "I/N", value_parser = parse_part)]
+    part: Option<Part>,
+    /// How progress is told on stderr
+    #[arg(long, value_name = "KIND", default_value = "bar")]
+    progress: ProgressKind,
     /// How multiple scattering is computed [default: the scene's]
     #[arg(long)]
     estimator: Option<EstimatorName>,
@@ -110,67 +124,128 @@ fn parse_crop(text: &str) -> Result<[u32; 4], String> {
     }
 }
 
+/// One of several shares of a render's samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    index: u32,
+    count: u32,
+}
+
+impl Part {
+    /// Its samples among so many; parts differ by one at most.
+    fn of(self, spp: u32) -> Range<u32> {
+        let edge = |index: u32| {
+            let edge = u64::from(spp) * u64::from(index) / u64::from(self.count);
+            u32::try_from(edge).expect("at most the number of samples")
+        };
+        edge(self.index)..edge(self.index + 1)
+    }
+}
+
+fn parse_part(text: &str) -> Result<Part, String> {
+    let (index, count) = text.split_once('/').ok_or("expected I/N, e.g. 0/8")?;
+    let number = |text: &str| {
+        let error = |_| format!("`{text}` is no number of a part");
+        text.trim().parse::<u32>().map_err(error)
+    };
+    let (index, count) = (number(index)?, number(count)?);
+    if index < count {
+        Ok(Part { index, count })
+    } else {
+        Err(format!(
+            "there are parts 0 to N − 1 of N; found {index}/{count}"
+        ))
+    }
+}
+
+/// The longest time that can be asked for, in seconds: a thousand years.
+const LONGEST_TIME: f64 = 3.2e10;
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match positive(text)? {
+        time if time <= LONGEST_TIME => Ok(time),
+        _ => Err("expected a time below a thousand years, in seconds".to_owned()),
+    }
+}
+
+fn interval(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(0.0) => Ok(0.0),
+        _ => seconds(text),
+    }
+}
+
 pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
     let mut description = args.scene.describe()?;
     apply(args, &mut description);
-    let outputs = outputs(args)?;
+    let outputs = Outputs::new(&args.scene.scene, &args.output, args.part, args.resume)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
             .build_global()
             .context("can't start the threads")?;
     }
-
-    let (scene, settings) = args.scene.resolve(&description, log)?;
+    let Resolved {
+        scene,
+        settings,
+        identity,
+        ..
+    } = args.scene.resolve(&description, log)?;
     let settings = override_settings(args, settings)?;
     let mut film = settings.film();
-    let fingerprint = fingerprint(&description);
-    let sidecar = sidecar_path(outputs[0].path());
-    if args.resume && sidecar.exists() {
-        film.resume(&sidecar, fingerprint)?;
-        match begun(&settings, &film) {
-            0 => writeln!(log, "too few samples to go on from: starting afresh")?,
-            samples => writeln!(log, "resuming at {samples} samples per pixel")?,
-        }
+    if args.resume && outputs.film.exists() {
+        film.resume(SavedFilm::read(&outputs.film)?, &identity)
+            .context("start afresh without --resume, or with another output")?;
+        let samples = film.samples_per_pixel();
+        writeln!(log, "resuming at {samples} samples per pixel")?;
     }
 
-    let interrupt = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupt);
-    // A second render in one process would find the handler set; there is none.
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
-        .context("can't listen for Ctrl-C")?;
-    let bar = progress_bar(&settings.limits);
-    let mut progress = |progress| show(&bar, &settings.limits, progress);
-    let control = Control {
-        interrupt: Some(&interrupt),
-        progress: Some(&mut progress),
+    let signals = Signals::listen()?;
+    let reporter = Reporter::new(args.progress, &settings.limits);
+    let target = settings.limits.spp;
+    let mut save = |film: &Film| match film.save(&outputs.film, &identity, target) {
+        Ok(()) => reporter.saved(),
+        Err(error) => reporter.warn(&format!("{error}; it is tried again later")),
     };
     let cpu_before = cpu_seconds();
+    let control = Control {
+        interrupt: Some(signals.interrupt()),
+        progress: Some(&|progress| reporter.show(progress)),
+        checkpoint: Some(Checkpoint {
+            interval: (args.checkpoint > 0.0).then(|| Duration::from_secs_f64(args.checkpoint)),
+            now: signals.save(),
+            save: &mut save,
+        }),
+    };
     let report = render(&scene, &settings, &mut film, control)
         .with_context(|| args.scene.scene.display().to_string())?;
-    bar.finish_and_clear();
+    reporter.finish();
     let cpu = cpu_before
         .zip(cpu_seconds())
         .map(|(before, after)| after - before);
 
+    // All files first: standard output may be closed.
+    let interrupted = report.stop == Stop::Interrupted;
+    let mut failed = outputs
+        .keep_film(&film, &identity, target, interrupted)
+        .err();
     let mut image = film.develop();
     image.attributes = attributes(args, &description, &report);
-    let mut failed = None;
-    for output in &outputs {
+    for output in &outputs.images {
         // One that fails must not keep the others from being written.
-        match output.write(&image, settings.exposure) {
-            Ok(()) => writeln!(out, "{}", output.path().display())?,
-            Err(error) => failed = Some(error),
+        if let Err(error) = output.write(&image, settings.exposure) {
+            failed = Some(error.into());
         }
     }
-    if args.resume || matches!(report.stop, Stop::Interrupted) {
-        film.save(&sidecar, fingerprint)?;
+    if let Some(error) = failed {
+        let rescued = outputs.rescue(&film, &identity, target);
+        return Err(error.context(rescued));
+    }
+    for path in outputs.written(interrupted) {
+        writeln!(out, "{}", path.display())?;
     }
     summarise(out, &scene, &film, &report, cpu)?;
-    match failed {
-        Some(error) => Err(error.into()),
-        None => Ok(ExitCode::SUCCESS),
-    }
+    Ok(signals.exit_code())
 }
 
 /// Puts what the command line says in place of what the file says.
@@ -191,37 +266,34 @@ fn override_settings(args: &Args, settings: RenderSettings) -> anyhow::Result<Re
     } else {
         settings.limits.spp
     };
+    let spp = args.spp.unwrap_or(default);
+    let share = match args.part {
+        Some(part) => {
+            ensure!(
+                args.spp.is_some() || !open_ended,
+                "--part is a share of a number of samples: --time or --noise need --spp with it"
+            );
+            let share = part.of(spp);
+            let (samples, parts) = (spp, part.count);
+            ensure!(
+                !share.is_empty(),
+                "{samples} samples are too few for {parts} parts"
+            );
+            share
+        }
+        None => settings.share,
+    };
     Ok(RenderSettings {
+        share,
         window: window(args, settings.resolution)?,
         limits: Limits {
-            spp: args.spp.unwrap_or(default),
+            spp,
             time: args.time.map(Duration::from_secs_f64),
             noise: args.noise,
         },
         all_in: args.all_in,
         ..settings
     })
-}
-
-/// The files to write, each checked now so that no finished render is lost.
-fn outputs(args: &Args) -> anyhow::Result<Vec<OutputPath>> {
-    let mut paths = args.output.clone();
-    if paths.is_empty() {
-        let stem = args
-            .scene
-            .scene
-            .file_stem()
-            .context("the scene file has no name")?;
-        paths.extend(["exr", "png"].map(|kind| PathBuf::from(stem).with_extension(kind)));
-    }
-    let outputs = paths
-        .into_iter()
-        .map(OutputPath::new)
-        .collect::<Result<Vec<_>, _>>()?;
-    for output in &outputs {
-        output.check()?;
-    }
-    Ok(outputs)
 }
 
 fn window(args: &Args, [width, height]: [u32; 2]) -> anyhow::Result<Window> {
@@ -238,17 +310,6 @@ fn window(args: &Args, [width, height]: [u32; 2]) -> anyhow::Result<Window> {
         width: x1 - x0,
         height: y1 - y0,
     })
-}
-
-/// Tells renders of other scenes apart, so that their samples are not mixed.
-fn fingerprint(description: &Description) -> u64 {
-    use std::hash::{DefaultHasher, Hash, Hasher};
-    let mut hasher = DefaultHasher::new();
-    // How many samples are taken does not change what a sample is.
-    let mut description = description.clone();
-    description.sampling.spp = 0;
-    format!("{description:?}").hash(&mut hasher);
-    hasher.finish()
 }
 
 fn attributes(
@@ -278,27 +339,6 @@ fn attributes(
         .into_iter()
         .map(|(key, value)| (key.to_owned(), value))
         .collect()
-}
-
-fn progress_bar(limits: &Limits) -> ProgressBar {
-    let bar = match limits.time {
-        Some(time) => ProgressBar::new(time.as_millis() as u64),
-        None => ProgressBar::new(u64::from(limits.spp)),
-    };
-    if !std::io::stderr().is_terminal() {
-        bar.set_draw_target(ProgressDrawTarget::hidden());
-    }
-    let style = ProgressStyle::with_template("{wide_bar} {percent}% {msg}, {eta} left")
-        .expect("a valid template");
-    bar.with_style(style)
-}
-
-fn show(bar: &ProgressBar, limits: &Limits, progress: Progress) {
-    bar.set_message(format!("{} spp", progress.spp));
-    bar.set_position(match limits.time {
-        Some(_) => progress.elapsed.as_millis() as u64,
-        None => u64::from(progress.spp),
-    });
 }
 
 fn summarise(
@@ -336,6 +376,11 @@ fn summarise(
     if !left_out.is_empty() {
         writeln!(out, "left out: {}", left_out.join(", "))?;
     }
+    tell_faults(out, film)
+}
+
+/// Warns of samples that could not be averaged in.
+pub fn tell_faults(out: &mut dyn Write, film: &Film) -> anyhow::Result<()> {
     for fault in film.faults() {
         writeln!(
             out,

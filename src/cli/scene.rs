@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use smithwalk::description::Description;
-use smithwalk::scene::{RenderSettings, Resolved, Scene, resolve};
+use smithwalk::scene::{Resolved, resolve};
 
 /// A scene file and changes to it.
 #[derive(clap::Args)]
@@ -35,16 +35,12 @@ impl SceneArgs {
         &self,
         description: &Description,
         log: &mut dyn Write,
-    ) -> anyhow::Result<(Scene, RenderSettings)> {
-        let Resolved {
-            scene,
-            settings,
-            repairs,
-        } = resolve(description)
+    ) -> anyhow::Result<Resolved> {
+        let resolved = resolve(description)
             .with_context(|| format!("{} can't be rendered", self.scene.display()))?;
-        for repair in repairs {
+        for repair in &resolved.repairs {
             writeln!(log, "warning: {repair}")?;
         }
-        Ok((scene, settings))
+        Ok(resolved)
     }
 }

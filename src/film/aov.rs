@@ -1,9 +1,12 @@
-//! What a film keeps beside the colour.
+//! What a film keeps beside the colour. To add an AOV: a row of the table here, and
+//! its value where paths are traced, in [`Sample::with`]'s caller.
+//!
+//! [`Sample::with`]: super::Sample::with
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// An arbitrary output variable: a layer of the image beside its colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aov {
     /// Directional albedo of the first surface, in [0, 1]; 0 where there is none.
@@ -23,47 +26,95 @@ pub enum Aov {
     Multiple,
 }
 
+/// What becomes of an AOV's values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Accumulation {
+    /// Their mean over all samples.
+    Mean,
+    /// Their mean over the samples that have one; this where none has.
+    MeanOfHits(f64),
+    /// It has none: it follows from the colour.
+    OfColor,
+}
+
+/// A row of the table of AOVs.
+pub(super) struct Row {
+    pub aov: Aov,
+    /// In scene files and of the layer in EXR files.
+    pub name: &'static str,
+    /// In EXR files.
+    pub channels: &'static [&'static str],
+    pub accumulation: Accumulation,
+    /// Whether it describes the first surface that a camera ray meets.
+    pub of_first_hit: bool,
+}
+
+/// Depth where no sample met a surface, as in Blender, in metres.
+const NO_DEPTH: f64 = 1e10;
+
+const RGB: &[&str] = &["R", "G", "B"];
+
+/// In the order of the enum and of an image's layers.
+const TABLE: [Row; Aov::COUNT] = {
+    use Accumulation::{Mean, MeanOfHits, OfColor};
+    const fn row(
+        aov: Aov,
+        name: &'static str,
+        channels: &'static [&'static str],
+        accumulation: Accumulation,
+        of_first_hit: bool,
+    ) -> Row {
+        Row {
+            aov,
+            name,
+            channels,
+            accumulation,
+            of_first_hit,
+        }
+    }
+    [
+        row(Aov::Albedo, "albedo", RGB, Mean, true),
+        row(Aov::Normal, "normal", &["X", "Y", "Z"], Mean, true),
+        row(Aov::Depth, "depth", &["Z"], MeanOfHits(NO_DEPTH), true),
+        row(Aov::Variance, "variance", RGB, OfColor, false),
+        row(Aov::Single, "single", RGB, Mean, false),
+        row(Aov::Multiple, "multiple", RGB, Mean, false),
+    ]
+};
+
 impl Aov {
+    /// Number of all AOVs.
+    pub const COUNT: usize = Self::Multiple as usize + 1;
+
     /// All of them, in the order of their layers.
-    pub const ALL: [Self; 6] = [
-        Self::Albedo,
-        Self::Normal,
-        Self::Depth,
-        Self::Variance,
-        Self::Single,
-        Self::Multiple,
-    ];
+    pub const ALL: [Self; Self::COUNT] = {
+        let mut all = [Self::Albedo; Self::COUNT];
+        let mut index = 0;
+        while index < all.len() {
+            all[index] = TABLE[index].aov;
+            index += 1;
+        }
+        all
+    };
+
+    pub(super) const fn row(self) -> &'static Row {
+        &TABLE[self as usize]
+    }
 
     /// The name in scene files and of the layer in EXR files.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Albedo => "albedo",
-            Self::Normal => "normal",
-            Self::Depth => "depth",
-            Self::Variance => "variance",
-            Self::Single => "single",
-            Self::Multiple => "multiple",
-        }
+        self.row().name
     }
 
     /// Whether it describes the first surface that a camera ray meets.
     pub const fn is_of_first_hit(self) -> bool {
-        matches!(self, Self::Albedo | Self::Normal | Self::Depth)
-    }
-
-    /// Names of its channels in EXR files.
-    pub(super) const fn channels(self) -> &'static [&'static str] {
-        match self {
-            Self::Normal => &["X", "Y", "Z"],
-            Self::Depth => &["Z"],
-            Self::Albedo | Self::Variance | Self::Single | Self::Multiple => &["R", "G", "B"],
-        }
+        self.row().of_first_hit
     }
 }
 
 /// The AOVs that were asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AovSet(pub(super) u8);
+pub struct AovSet(u32);
 
 impl AovSet {
     /// No AOVs: the colour alone.
@@ -71,7 +122,7 @@ impl AovSet {
 
     /// Whether `aov` was asked for.
     pub const fn contains(self, aov: Aov) -> bool {
-        self.0 & (1 << aov as u8) != 0
+        self.0 & (1 << aov as u32) != 0
     }
 
     /// Those asked for, in the order of [`Aov::ALL`].
@@ -84,7 +135,21 @@ impl FromIterator<Aov> for AovSet {
     fn from_iter<I: IntoIterator<Item = Aov>>(aovs: I) -> Self {
         Self(
             aovs.into_iter()
-                .fold(0, |bits, aov| bits | (1 << aov as u8)),
+                .fold(0, |bits, aov| bits | (1 << aov as u32)),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_in_the_order_of_the_enum_and_has_its_names() {
+        for (index, aov) in Aov::ALL.into_iter().enumerate() {
+            assert_eq!(aov as usize, index);
+            let named: Aov = serde_json::from_value(aov.name().into()).unwrap();
+            assert_eq!(named, aov);
+        }
     }
 }

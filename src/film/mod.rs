@@ -10,17 +10,20 @@
 //! [`Film::develop`] turns sums into an [`Image`].
 
 mod aov;
+mod exact;
 mod filter;
 mod noise;
-mod plan;
-mod resume;
+mod save;
+mod taken;
 mod tile;
 
 pub use aov::{Aov, AovSet};
 pub use filter::PixelFilter;
-pub use plan::{Draws, Spread};
-pub use resume::{ResumeError, sidecar_path};
+pub use save::{FilmError, Header, Identity, SavedFilm, difference, sidecar_path};
+pub use taken::Taken;
 pub use tile::{Fault, FaultCount, FilmTile, Sample};
+
+use std::ops::Range;
 
 use crate::image::{Image, Layer, Window};
 
@@ -36,6 +39,8 @@ pub struct Film {
     /// The part of it that is rendered.
     window: Window,
     aovs: AovSet,
+    /// Indices of the samples that it is to have.
+    share: Range<u32>,
     /// In rows of tiles, left to right; tiles at the right and the bottom may
     /// be cut off.
     tiles: Vec<FilmTile>,
@@ -63,14 +68,28 @@ impl Film {
                 width: TILE_SIZE.min(window.width - x),
                 height: TILE_SIZE.min(window.height - y),
             })
-            .map(|tile| FilmTile::new(tile, aovs))
+            .map(|tile| FilmTile::new(tile, aovs, 0))
             .collect();
         Self {
             resolution,
             window,
             aovs,
+            share: 0..u32::MAX,
             tiles,
         }
+    }
+
+    /// Makes this empty film one of a part of the samples, those with these indices.
+    pub fn set_share(&mut self, share: Range<u32>) {
+        for tile in &mut self.tiles {
+            *tile = FilmTile::new(tile.window(), self.aovs, share.start);
+        }
+        self.share = share;
+    }
+
+    /// Indices of the samples that it is to have; without end for the whole of a render.
+    pub fn share(&self) -> Range<u32> {
+        self.share.clone()
     }
 
     /// Width and height of the full image in pixels.
@@ -93,11 +112,62 @@ impl Film {
         &mut self.tiles
     }
 
-    /// The number of samples that every pixel has had at least: the index of
-    /// the next sample when all have had equally many.
+    /// The tiles.
+    pub fn tiles(&self) -> &[FilmTile] {
+        &self.tiles
+    }
+
+    /// The number of samples that every pixel has had at least.
     pub fn samples_per_pixel(&self) -> u32 {
-        let least = |tile: &FilmTile| tile.samples_per_pixel();
+        let least = |tile: &FilmTile| tile.taken().count();
         self.tiles.iter().map(least).min().unwrap_or(0)
+    }
+
+    /// The samples of a tile that has the fewest.
+    pub fn common(&self) -> Taken {
+        let fewest = self
+            .tiles
+            .iter()
+            .map(FilmTile::taken)
+            .min_by_key(|t| t.count());
+        fewest.cloned().unwrap_or_default()
+    }
+
+    /// Adds the samples of other films of the same layout, the order of which does not
+    /// matter.
+    ///
+    /// # Errors
+    /// When a sample is in more than one: the positions of two films that overlap, the
+    /// first of them 0 for this film. It is then of no use any more.
+    ///
+    /// # Panics
+    /// When the layouts differ.
+    pub fn merge(&mut self, others: &[Self]) -> Result<(), [usize; 2]> {
+        self.share = 0..u32::MAX;
+        for (position, tile) in self.tiles.iter_mut().enumerate() {
+            let mut parts: Vec<(usize, &FilmTile)> = others
+                .iter()
+                .map(|film| {
+                    assert_eq!((film.window, film.aovs), (self.window, self.aovs));
+                    &film.tiles[position]
+                })
+                .zip(1..)
+                .map(|(tile, film)| (film, tile))
+                .collect();
+            let own = tile.clone();
+            parts.push((0, &own));
+            parts.sort_by_key(|(_, tile)| tile.taken().ranges().first().map_or(0, |r| r.start));
+            *tile = FilmTile::new(own.window(), self.aovs, own.next());
+            let mut before = 0;
+            for (film, part) in parts {
+                let Some(union) = tile.taken().union(part.taken()) else {
+                    return Err([before, film]);
+                };
+                tile.merge(part, union);
+                before = film;
+            }
+        }
+        Ok(())
     }
 
     /// Samples that were left out of the image because their values were
@@ -105,7 +175,10 @@ impl Film {
     pub fn faults(&self) -> Vec<FaultCount> {
         let per_tile = |fault| {
             let of_tiles = self.tiles.iter().map(move |tile| tile.fault(fault));
-            of_tiles.fold(FaultCount::new(fault), FaultCount::merge)
+            of_tiles.fold(FaultCount::new(fault), |mut sum, count| {
+                sum.absorb(count);
+                sum
+            })
         };
         let counts = Fault::ALL.into_iter().map(per_tile);
         counts.filter(|count| count.samples > 0).collect()
@@ -123,7 +196,7 @@ impl Film {
         image.layers = self
             .aovs
             .iter()
-            .map(|aov| Layer::black(aov.name(), aov.channels(), self.window.area()))
+            .map(|aov| Layer::black(aov.name(), aov.row().channels, self.window.area()))
             .collect();
         for tile in &self.tiles {
             for pixel in tile.window().pixels() {
@@ -145,11 +218,12 @@ impl Film {
 mod tests {
     use super::*;
 
-    fn sample(color: [f32; 3]) -> Sample {
-        Sample {
-            color,
-            ..Sample::default()
-        }
+    /// Adds a sample of the one pixel.
+    fn add(film: &mut Film, paths: &[Sample]) -> bool {
+        let tile = &mut film.tiles_mut()[0];
+        let counted = tile.add([0, 0], paths);
+        tile.advance();
+        counted
     }
 
     #[test]
@@ -187,9 +261,8 @@ mod tests {
     fn mean_and_variance_of_two_samples() {
         let aovs = AovSet::from_iter([Aov::Variance, Aov::Depth]);
         let mut film = Film::new([1, 1], Window::full([1, 1]), aovs);
-        let tile = &mut film.tiles_mut()[0];
-        tile.add([0, 0], &[sample([1.0, 0.0, 5.0])]);
-        tile.add([0, 0], &[sample([3.0, 0.0, 5.0])]);
+        add(&mut film, &[Sample::of([1.0, 0.0, 5.0])]);
+        add(&mut film, &[Sample::of([3.0, 0.0, 5.0])]);
         let image = film.develop();
         assert_eq!(image.color, [[2.0, 0.0, 5.0]]);
         let variance = image.layer("variance").unwrap();
@@ -202,18 +275,16 @@ mod tests {
     fn aovs_are_averaged_and_depth_over_hits() {
         let aovs = Aov::ALL.into_iter().collect();
         let mut film = Film::new([1, 1], Window::full([1, 1]), aovs);
-        let hit = Sample {
-            color: [1.0; 3],
-            albedo: [0.5, 0.25, 1.0],
-            normal: [0.0, -1.0, 0.0],
-            depth: Some(3.0),
-            single: [0.75; 3],
-            multiple: [0.25; 3],
-        };
+        let hit = Sample::of([1.0; 3])
+            .with(Aov::Albedo, [0.5, 0.25, 1.0])
+            .with(Aov::Normal, [0.0, -1.0, 0.0])
+            .with(Aov::Depth, [3.0, f32::NAN, 0.0])
+            .with(Aov::Single, [0.75; 3])
+            .with(Aov::Multiple, [0.25; 3]);
         let mut one_sample = film.clone();
-        one_sample.tiles_mut()[0].add([0, 0], &[hit, Sample::default()]);
-        film.tiles_mut()[0].add([0, 0], &[hit]);
-        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
+        add(&mut one_sample, &[hit, Sample::default()]);
+        add(&mut film, &[hit]);
+        add(&mut film, &[Sample::default()]);
         for film in [film, one_sample] {
             let image = film.develop();
             let layer = |name| image.layer(name).unwrap().planes.concat();
@@ -229,10 +300,10 @@ mod tests {
     #[test]
     fn one_impossible_path_spoils_a_sample() {
         let mut film = Film::new([1, 1], Window::full([1, 1]), AovSet::NONE);
-        let tile = &mut film.tiles_mut()[0];
-        assert!(!tile.add([0, 0], &[sample([3.0; 3]), sample([-1.0; 3])]));
-        assert!(tile.add([0, 0], &[sample([3.0; 3]), sample([1.0; 3])]));
-        assert_eq!(tile.fault(Fault::Negative).samples, 1);
+        let [three, one, negative] = [3.0, 1.0, -1.0].map(|value| Sample::of([value; 3]));
+        assert!(!add(&mut film, &[three, negative]));
+        assert!(add(&mut film, &[three, one]));
+        assert_eq!(film.faults()[0].samples, 1);
         assert_eq!(film.develop().color, [[2.0; 3]]);
     }
 
@@ -240,20 +311,27 @@ mod tests {
     fn impossible_samples_are_counted_by_cause_and_left_out() {
         let mut film = Film::new([40, 40], Window::full([40, 40]), AovSet::NONE);
         for tile in film.tiles_mut() {
-            for pixel in tile.window().pixels() {
-                tile.add(pixel, &[sample([2.0; 3])]);
-                if pixel[0] == pixel[1] {
-                    tile.add(pixel, &[sample([1.0, f32::NAN, -1.0])]);
-                    tile.add(pixel, &[sample([f32::INFINITY, 1.0, 1.0])]);
-                    tile.add(pixel, &[sample([0.0, -1e-9, 1.0])]);
-                    tile.add(pixel, &[sample([-0.0, 4.0, 4.0])]);
+            for color in [
+                [2.0; 3],
+                [1.0, f32::NAN, -1.0],
+                [f32::INFINITY, 1.0, 1.0],
+                [0.0, -1e-9, 1.0],
+                [-0.0, 4.0, 4.0],
+            ] {
+                for pixel in tile.window().pixels() {
+                    let diagonal = pixel[0] == pixel[1];
+                    tile.add(
+                        pixel,
+                        &[Sample::of(if diagonal { color } else { [2.0; 3] })],
+                    );
                 }
+                tile.advance();
             }
         }
         let image = film.develop();
         assert_eq!(image.color[41], [1.0, 3.0, 3.0]);
         assert_eq!(image.color[1], [2.0; 3]);
-        assert_eq!(film.samples_per_pixel(), 1);
+        assert_eq!(film.samples_per_pixel(), 5);
         let faults = film.faults();
         let causes: Vec<_> = faults.iter().map(|f| (f.fault, f.samples)).collect();
         let expected = Fault::ALL.into_iter().take(3).map(|fault| (fault, 40));
@@ -266,12 +344,13 @@ mod tests {
     fn sums_do_not_depend_on_the_order_of_tiles() {
         use rayon::prelude::*;
         let fill = |tile: &mut FilmTile| {
-            for pixel in tile.window().pixels() {
-                for index in 0..8 {
+            for index in 0..8 {
+                for pixel in tile.window().pixels() {
                     let mut sampler = crate::sampler::Sampler::new(0, pixel, index);
                     let u = sampler.get_4d(crate::sampler::Dimension::bsdf(0));
-                    tile.add(pixel, &[sample([u[0], u[1] * 1e6, u[2] * 1e-6])]);
+                    tile.add(pixel, &[Sample::of([u[0], u[1] * 1e6, u[2] * 1e-6])]);
                 }
+                tile.advance();
             }
         };
         let new = || Film::new([70, 50], Window::full([70, 50]), AovSet::NONE);
@@ -287,6 +366,7 @@ mod tests {
         let none = bytes(AovSet::NONE);
         assert_eq!(bytes(AovSet::from_iter([Aov::Variance])), none);
         let depth = bytes(AovSet::from_iter([Aov::Depth]));
-        assert_eq!(depth - none, 64 * 64 * 16);
+        // Two sums of 17 bytes, and how often it was left out.
+        assert_eq!(depth - none, 64 * 64 * (2 * 17 + 4));
     }
 }

@@ -13,24 +13,20 @@ impl Film {
     ///
     /// with ε = 0.01 and the worst 0.1 % of pixels left out, as
     /// [`crate::metrics::rel_mse_trimmed`] does, so that a single firefly does
-    /// not decide. V is (m₁ − m₂)²/4, m₁ and m₂ being the pixel's means over
-    /// the first and the second half of the samples, up to the last power of
-    /// two; it counts in what stratification gains within a half, which the
-    /// sample variance can't. As it misses what the halves gain together, it
-    /// errs on the large side: by √(2^(1+a) − 1) where the variance falls as
-    /// n^(−1−a), a between 0 (independent samples) and 2. `None` while a pixel
-    /// has fewer than two samples.
+    /// not decide. V comes from how the pixel's means over two halves of the samples
+    /// differ, up to the last power of two of the sample index; it counts in what
+    /// stratification gains within a half, which the sample variance can't. As it misses
+    /// what the halves gain together, it errs on the large side: by √(2^(1+a) − 1) where
+    /// the variance falls as n^(−1−a), a between 0 (independent samples) and 2. `None`
+    /// while a half is empty.
     pub fn relative_error(&self) -> Option<f64> {
         let mut terms = Vec::with_capacity(self.window.area());
         for tile in &self.tiles {
-            if tile.colors.iter().any(|color| color.count < 2) {
-                return None;
-            }
             for pixel in tile.window().pixels() {
                 let relative = tile
                     .color(pixel)
                     .into_iter()
-                    .zip(tile.doubling_variance(pixel))
+                    .zip(tile.halves_variance(pixel)?)
                     .map(|(mean, variance)| variance / (mean * mean + EPSILON));
                 terms.push(relative.sum::<f64>() / 3.0);
             }
@@ -54,18 +50,14 @@ mod tests {
         let window = Window::full([SIDE, SIDE]);
         let mut film = Film::new([SIDE, SIDE], window, AovSet::NONE);
         for tile in film.tiles_mut() {
-            for pixel in tile.window().pixels() {
-                for index in 0..SPP {
-                    // Another seed for each sample makes them independent.
-                    let (seed, index) = if sobol { (0, index) } else { (index.into(), 0) };
+            for index in 0..SPP {
+                // Another seed for each sample makes them independent.
+                let (seed, index) = if sobol { (0, index) } else { (index.into(), 0) };
+                for pixel in tile.window().pixels() {
                     let u = Sampler::new(seed, pixel, index).get_2d(Dimension::lens());
-                    let color = [integrand(u); 3];
-                    let sample = Sample {
-                        color,
-                        ..Sample::default()
-                    };
-                    tile.add(pixel, &[sample]);
+                    tile.add(pixel, &[Sample::of([integrand(u); 3])]);
                 }
+                tile.advance();
             }
         }
         let exact = vec![[integral as f32; 3]; window.area()];
@@ -107,9 +99,13 @@ mod tests {
     fn one_sample_says_nothing() {
         let mut film = Film::new([1, 1], Window::full([1, 1]), AovSet::NONE);
         assert_eq!(film.relative_error(), None);
-        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
+        let add = |film: &mut Film| {
+            film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
+            film.tiles_mut()[0].advance();
+        };
+        add(&mut film);
         assert_eq!(film.relative_error(), None);
-        film.tiles_mut()[0].add([0, 0], &[Sample::default()]);
+        add(&mut film);
         assert_eq!(film.relative_error(), Some(0.0));
     }
 }

@@ -1,30 +1,37 @@
 //! The accumulators of a tile of pixels.
 
-use super::plan::{Draws, Pilot, Spread};
-use super::{Aov, AovSet};
+use super::aov::Accumulation;
+use super::exact::ExactSums;
+use super::{Aov, AovSet, Taken};
 use crate::image::Window;
 
 /// Pixel positions that are remembered per cause of a fault.
 pub(super) const FAULT_PIXELS: usize = 8;
 
-/// Depth where no sample met a surface, as in Blender, in metres.
-const NO_DEPTH: f64 = 1e10;
-
-/// What one camera path contributes. What was not asked for is not looked at.
+/// What one camera path contributes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Radiance, W·sr⁻¹·m⁻², scene-linear Rec. 709.
     pub color: [f32; 3],
-    /// [`Aov::Albedo`].
-    pub albedo: [f32; 3],
-    /// [`Aov::Normal`].
-    pub normal: [f32; 3],
-    /// [`Aov::Depth`], in metres; `None` when the ray met nothing.
-    pub depth: Option<f32>,
-    /// [`Aov::Single`], part of `color`.
-    pub single: [f32; 3],
-    /// [`Aov::Multiple`], part of `color`.
-    pub multiple: [f32; 3],
+    aovs: [Option<[f32; 3]>; Aov::COUNT],
+}
+
+impl Sample {
+    /// Of this radiance, W·sr⁻¹·m⁻², without AOVs.
+    #[must_use]
+    pub fn of(color: [f32; 3]) -> Self {
+        Self {
+            color,
+            ..Self::default()
+        }
+    }
+
+    /// With a value of an AOV; further ones than it has channels are not looked at.
+    #[must_use]
+    pub fn with(mut self, aov: Aov, value: [f32; 3]) -> Self {
+        self.aovs[aov as usize] = Some(value);
+        self
+    }
 }
 
 /// Why a sample can't be averaged in.
@@ -108,66 +115,83 @@ impl FaultCount {
         }
     }
 
-    pub(super) fn merge(mut self, other: &Self) -> Self {
+    /// Adds what another has counted.
+    pub(super) fn absorb(&mut self, other: &Self) {
         self.samples += other.samples;
         other.pixels.iter().for_each(|&pixel| self.remember(pixel));
-        self
     }
 }
 
-/// Sums over the samples of a pixel's colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct ColorSum {
-    pub sum: [f64; 3],
-    pub squares: [f64; 3],
-    /// The mean when the count last was a power of two.
-    pub milestone: [f32; 3],
-    /// How far the mean had moved by then, since the power of two before.
-    pub moved: [f32; 3],
-    /// Samples averaged in.
-    pub count: u32,
-    /// Samples left out for a [`Fault`] of their colour.
-    pub left_out: u32,
-    /// See [`FilmTile::draws`].
-    pub draws: Draws,
+/// Channels of the colour, and of its squares.
+const COLOR_SUMS: usize = 6;
+
+/// An AOV that a film keeps sums of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stored {
+    aov: Aov,
+    /// Where its channels are among a pixel's sums.
+    offset: usize,
+    channels: usize,
+    /// Whether the sum of the shares of samples that have a value follows.
+    weighed: bool,
 }
 
-/// A rectangle of pixels and their accumulators, in f64.
+/// A rectangle of pixels and their accumulators.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmTile {
     window: Window,
-    /// Per pixel, row by row.
-    pub(super) colors: Vec<ColorSum>,
-    /// Per pixel, and there per stored AOV: the sum of each channel, and the
-    /// number of samples in it, of which a path can be a part.
-    pub(super) sums: Vec<f64>,
-    /// The AOVs in `sums`, and where each begins within a pixel.
-    offsets: Vec<(Aov, usize)>,
-    /// Length of a pixel in `sums`.
+    /// The samples that all pixels have had, those left out among them.
+    pub(super) taken: Taken,
+    /// Index of the first sample of this film.
+    first: u32,
+    /// Per pixel, row by row: colour, squares of the colour, and the AOVs of `stored`.
+    pub(super) sums: ExactSums,
+    stored: Vec<Stored>,
+    /// Number of sums of a pixel.
     stride: usize,
+    /// Per pixel, with Q the largest power of two that sample indices have reached:
+    /// the colour's sums over its samples below Q/2 and from there to Q.
+    pub(super) halves: Vec<[[f32; 3]; 2]>,
+    /// Per pixel, samples left out for a [`Fault`] of their colour.
+    pub(super) left_out: Vec<u32>,
+    /// Per pixel, samples whose AOVs alone were left out; empty without AOVs.
+    pub(super) aovs_left_out: Vec<u32>,
     /// In the order of [`Fault::ALL`].
     pub(super) faults: [FaultCount; 4],
-    /// Per pixel, what [`super::Film::plan`] goes by; empty when there is none.
-    pub(super) pilots: Vec<Pilot>,
 }
 
 impl FilmTile {
-    pub(super) fn new(window: Window, aovs: AovSet) -> Self {
-        let mut stride = 0;
-        let mut offsets = Vec::new();
-        // The variance needs no sums but those of the colour.
-        for aov in aovs.iter().filter(|&aov| aov != Aov::Variance) {
-            offsets.push((aov, stride));
-            stride += aov.channels().len() + 1;
+    pub(super) fn new(window: Window, aovs: AovSet, first: u32) -> Self {
+        let mut stride = COLOR_SUMS;
+        let mut stored = Vec::new();
+        for aov in aovs.iter() {
+            let row = aov.row();
+            let weighed = match row.accumulation {
+                Accumulation::Mean => false,
+                Accumulation::MeanOfHits(_) => true,
+                Accumulation::OfColor => continue,
+            };
+            let channels = row.channels.len();
+            stored.push(Stored {
+                aov,
+                offset: stride,
+                channels,
+                weighed,
+            });
+            stride += channels + usize::from(weighed);
         }
+        let area = window.area();
         Self {
             window,
-            colors: vec![ColorSum::default(); window.area()],
-            sums: vec![0.0; stride * window.area()],
-            offsets,
+            taken: Taken::default(),
+            first,
+            sums: ExactSums::new(stride * area),
+            halves: vec![[[0.0; 3]; 2]; area],
+            left_out: vec![0; area],
+            aovs_left_out: vec![0; if stored.is_empty() { 0 } else { area }],
+            stored,
             stride,
             faults: Fault::ALL.map(FaultCount::new),
-            pilots: Vec::new(),
         }
     }
 
@@ -176,9 +200,19 @@ impl FilmTile {
         self.window
     }
 
-    /// Adds a sample of `pixel` (column, row of the full image), the mean of these
-    /// camera paths, or counts it as a [`Fault`]; false when its colour was left out
-    /// for that.
+    /// Which samples all pixels have.
+    pub fn taken(&self) -> &Taken {
+        &self.taken
+    }
+
+    /// The index of the next sample.
+    pub fn next(&self) -> u32 {
+        self.taken.end().max(self.first)
+    }
+
+    /// Adds sample [`Self::next`] of `pixel` (column, row of the full image), the mean
+    /// of these camera paths, or counts it as a [`Fault`]; false when its colour was
+    /// left out for that. When all pixels have had theirs, [`Self::advance`] follows.
     pub fn add(&mut self, pixel: [u32; 2], paths: &[Sample]) -> bool {
         let index = self.window.index(pixel);
         let share = 1.0 / paths.len() as f32;
@@ -188,84 +222,97 @@ impl FilmTile {
                 *mean += share * value;
             }
         }
-        let color = &mut self.colors[index];
         // One path can hide in the mean: black takes a negative one up.
         let colors = paths.iter().map(|path| path.color);
         if let Some(fault) = colors.chain([mean]).find_map(Fault::of_color) {
-            color.left_out += 1;
+            self.left_out[index] += 1;
             self.faults[fault as usize].add(pixel);
             return false;
         }
-        color.count += 1;
+        let first = index * self.stride;
         for (channel, value) in mean.into_iter().enumerate() {
             let value = f64::from(value);
-            color.sum[channel] += value;
-            color.squares[channel] += value * value;
+            self.sums.add(first + channel, value);
+            self.sums.add(first + 3 + channel, value * value);
         }
-        if color.count.is_power_of_two() {
-            for channel in 0..3 {
-                let mean = (color.sum[channel] / f64::from(color.count)) as f32;
-                color.moved[channel] = mean - color.milestone[channel];
-                color.milestone[channel] = mean;
-            }
-        }
-        if self.stride > 0 {
-            let mut broken = false;
-            for path in paths {
-                broken |= !self.add_aovs(index, path, f64::from(share));
-            }
-            if broken {
-                self.faults[Fault::Aov as usize].add(pixel);
-            }
+        if !self.stored.is_empty() {
+            self.add_aovs(index, pixel, paths, share);
         }
         true
     }
 
-    /// Adds this share of a sample; false when one of its AOVs had to be left out.
-    fn add_aovs(&mut self, index: usize, path: &Sample, share: f64) -> bool {
-        let sums = &mut self.sums[index * self.stride..][..self.stride];
-        let mut broken = false;
-        for &(aov, offset) in &self.offsets {
-            let depth = path.depth.map(|depth| [depth]);
-            let values: &[f32] = match aov {
-                Aov::Albedo => &path.albedo,
-                Aov::Normal => &path.normal,
-                Aov::Depth => match &depth {
-                    Some(depth) => depth,
-                    None => continue,
-                },
-                Aov::Single => &path.single,
-                Aov::Multiple => &path.multiple,
-                Aov::Variance => unreachable!("the variance is not stored"),
-            };
-            if !values.iter().all(|value| value.is_finite()) {
-                broken = true;
-                continue;
-            }
-            for (sum, &value) in sums[offset..].iter_mut().zip(values) {
-                *sum += share * f64::from(value);
-            }
-            sums[offset + values.len()] += share;
+    /// Adds the AOVs of a sample, or none of them when one is impossible.
+    fn add_aovs(&mut self, index: usize, pixel: [u32; 2], paths: &[Sample], share: f32) {
+        let finite = |stored: &Stored| {
+            let values = paths
+                .iter()
+                .filter_map(|path| path.aovs[stored.aov as usize]);
+            values
+                .flat_map(|value| value.into_iter().take(stored.channels))
+                .all(f32::is_finite)
+        };
+        if !self.stored.iter().all(finite) {
+            self.aovs_left_out[index] += 1;
+            self.faults[Fault::Aov as usize].add(pixel);
+            return;
         }
-        !broken
+        let first = index * self.stride;
+        for stored in &self.stored {
+            let mut mean = [0.0; 3];
+            let mut weight = 0.0;
+            for value in paths
+                .iter()
+                .filter_map(|path| path.aovs[stored.aov as usize])
+            {
+                weight += share;
+                for (mean, value) in mean.iter_mut().zip(value) {
+                    *mean += share * value;
+                }
+            }
+            let offset = first + stored.offset;
+            for (channel, &value) in mean.iter().take(stored.channels).enumerate() {
+                self.sums.add(offset + channel, value.into());
+            }
+            if stored.weighed {
+                self.sums.add(offset + stored.channels, weight.into());
+            }
+        }
     }
 
-    /// Number of samples of `pixel` so far, with those left out: the index of
-    /// its next sample.
-    pub fn samples(&self, pixel: [u32; 2]) -> u32 {
-        let color = &self.colors[self.window.index(pixel)];
-        color.count + color.left_out
+    /// All pixels have had sample [`Self::next`].
+    pub fn advance(&mut self) {
+        let next = self.next();
+        self.taken.push(next);
+        if (next + 1).is_power_of_two() {
+            self.mark_half();
+        }
     }
 
-    pub(super) fn samples_per_pixel(&self) -> u32 {
-        let taken = self.colors.iter().map(|c| c.count + c.left_out);
-        taken.min().unwrap_or(0)
+    /// Sample indices have reached a power of two: it takes the place of Q.
+    fn mark_half(&mut self) {
+        for (index, [early, late]) in self.halves.iter_mut().enumerate() {
+            for channel in 0..3 {
+                let total = self.sums.get(index * self.stride + channel);
+                early[channel] += late[channel];
+                late[channel] = (total - f64::from(early[channel])) as f32;
+            }
+        }
+    }
+
+    fn count_at(&self, index: usize) -> u32 {
+        self.taken.count() - self.left_out[index]
+    }
+
+    /// Number of samples of `pixel` that were averaged in.
+    pub fn count(&self, pixel: [u32; 2]) -> u32 {
+        self.count_at(self.window.index(pixel))
     }
 
     /// Mean radiance of `pixel`; black without a sample.
     pub fn color(&self, pixel: [u32; 2]) -> [f64; 3] {
-        let color = &self.colors[self.window.index(pixel)];
-        color.sum.map(|sum| sum / f64::from(color.count.max(1)))
+        let index = self.window.index(pixel);
+        let n = f64::from(self.count_at(index).max(1));
+        [0, 1, 2].map(|channel| self.sums.get(index * self.stride + channel) / n)
     }
 
     /// Estimated variance of [`Self::color`], in its unit squared:
@@ -273,63 +320,45 @@ impl FilmTile {
     /// samples vary less than that, so it errs on the large side. Zero with
     /// fewer than two samples.
     pub fn variance(&self, pixel: [u32; 2]) -> [f64; 3] {
-        let color = &self.colors[self.window.index(pixel)];
-        let n = f64::from(color.count);
-        if color.count < 2 {
+        let index = self.window.index(pixel);
+        let count = self.count_at(index);
+        let n = f64::from(count);
+        if count < 2 {
             return [0.0; 3];
         }
         [0, 1, 2].map(|channel| {
-            let sum = color.sum[channel];
-            let deviations = color.squares[channel] - sum * sum / n;
-            deviations.max(0.0) / (n * (n - 1.0))
+            let sum = self.sums.get(index * self.stride + channel);
+            let squares = self.sums.get(index * self.stride + 3 + channel);
+            (squares - sum * sum / n).max(0.0) / (n * (n - 1.0))
         })
     }
 
-    /// How the paths of `pixel` split; none at all as long as
-    /// [`super::Film::plan`] has not decided.
-    pub fn draws(&self, pixel: [u32; 2]) -> Draws {
-        self.colors[self.window.index(pixel)].draws
-    }
-
-    pub(super) fn set_draws(&mut self, pixel: [u32; 2], draws: Draws) {
-        self.colors[self.window.index(pixel)].draws = draws;
-    }
-
-    /// Takes note of how the parts of a sample of `pixel` differ.
-    pub fn add_pilot(&mut self, pixel: [u32; 2], light_samples: Spread, branches: Spread) {
-        self.pilots.resize(self.window.area(), Pilot::default());
-        let pilot = &mut self.pilots[self.window.index(pixel)];
-        pilot.light_samples += light_samples;
-        pilot.branches += branches;
-    }
-
-    /// Forgets the samples of `pixel` and how they differ; faults found in them stay
-    /// counted.
-    pub fn clear(&mut self, pixel: [u32; 2]) {
-        let index = self.window.index(pixel);
-        let draws = self.colors[index].draws;
-        self.colors[index] = ColorSum {
-            draws,
-            ..ColorSum::default()
-        };
-        self.sums[index * self.stride..][..self.stride].fill(0.0);
-        if let Some(pilot) = self.pilots.get_mut(index) {
-            *pilot = Pilot::default();
-        }
-    }
-
     /// An estimate of the variance of [`Self::color`] that is far too uncertain
-    /// for a single pixel, but sees what stratification gains: the squared
-    /// distance that the mean moved when the number of samples n₂ last doubled.
-    /// With the means m₁, m₂ of both halves that is (m₁ − m₂)²/4; if it were not
-    /// for the strata that the halves share, its expectation would be the
-    /// variance of (m₁ + m₂)/2. Samples since then are taken to reduce it by
-    /// n₂/n. Useless with fewer than two samples.
-    pub(super) fn doubling_variance(&self, pixel: [u32; 2]) -> [f64; 3] {
-        let color = &self.colors[self.window.index(pixel)];
-        let doubled = color.count.checked_ilog2().map_or(0, |log2| 1 << log2);
-        let share = f64::from(doubled) / f64::from(color.count);
-        color.moved.map(|moved| share * f64::from(moved).powi(2))
+    /// for a single pixel, but sees what stratification gains: from the squared
+    /// distance of the means m₁, m₂ over the first n₁ samples and the next n₂, the
+    /// halves up to a power of two of the sample index, v = (m₁ − m₂)²/(1/n₁ + 1/n₂)
+    /// for one sample, and v/n for n. If it were not for the strata that the halves
+    /// share, its expectation would be right. `None` while a half has no sample.
+    pub(super) fn halves_variance(&self, pixel: [u32; 2]) -> Option<[f64; 3]> {
+        let index = self.window.index(pixel);
+        let whole = self.taken.end().checked_ilog2().map_or(0, |log2| 1 << log2);
+        let first = self.taken.count_below(whole / 2);
+        let second = self.taken.count_below(whole) - first;
+        if first == 0 || second == 0 {
+            return None;
+        }
+        // Samples left out are taken to be as frequent in both halves.
+        let n = f64::from(self.count_at(index));
+        let kept = n / f64::from(self.taken.count());
+        let [n1, n2] = [first, second].map(|count| f64::from(count) * kept);
+        let [early, late] = self.halves[index];
+        Some([0, 1, 2].map(|channel| {
+            let [m1, m2] = [
+                f64::from(early[channel]) / n1,
+                f64::from(late[channel]) / n2,
+            ];
+            (m1 - m2).powi(2) / (1.0 / n1 + 1.0 / n2) / n
+        }))
     }
 
     /// The channels of `aov` in `pixel`.
@@ -337,21 +366,90 @@ impl FilmTile {
     /// # Panics
     /// If the film was made without that AOV.
     pub(super) fn aov(&self, pixel: [u32; 2], aov: Aov) -> Vec<f64> {
-        if aov == Aov::Variance {
-            return self.variance(pixel).to_vec();
+        let empty = match aov.row().accumulation {
+            Accumulation::OfColor => return self.variance(pixel).to_vec(),
+            Accumulation::Mean => 0.0,
+            Accumulation::MeanOfHits(empty) => empty,
+        };
+        let stored = self.stored.iter().find(|stored| stored.aov == aov);
+        let stored = stored.expect("an AOV that the film keeps");
+        let index = self.window.index(pixel);
+        let offset = index * self.stride + stored.offset;
+        let weight = if stored.weighed {
+            self.sums.get(offset + stored.channels)
+        } else {
+            f64::from(self.count_at(index) - self.aovs_left_out[index])
+        };
+        let mean = |channel| {
+            if weight > 0.0 {
+                self.sums.get(offset + channel) / weight
+            } else {
+                empty
+            }
+        };
+        (0..stored.channels).map(mean).collect()
+    }
+
+    /// Adds the samples of a tile of the same pixels, which has none that this one has.
+    /// In the order of their indices, so that the halves have the same bits.
+    pub(super) fn merge(&mut self, other: &Self, taken: Taken) {
+        let before = |end: u32| end.checked_ilog2().map_or(0, |log2| 1_u32 << log2);
+        let whole = before(taken.end());
+        // What `tile` has below half of the new Q, and from there to Q.
+        let halves = |tile: &Self, index: usize| {
+            let [early, late] = tile.halves[index];
+            let own = before(tile.taken.end());
+            let (below, end) = (whole / 2, tile.taken.end());
+            let total = |channel| tile.sums.get(index * tile.stride + channel) as f32;
+            [0, 1, 2].map(|channel| {
+                let (early, late) = (early[channel], late[channel]);
+                match () {
+                    () if end <= below => [total(channel), 0.0],
+                    () if own == whole => [early, late],
+                    // From `own` = Q/2 on, all below Q.
+                    () => [early + late, total(channel) - early - late],
+                }
+            })
+        };
+        for index in 0..self.halves.len() {
+            let [mine, others] = [halves(self, index), halves(other, index)];
+            for channel in 0..3 {
+                for half in 0..2 {
+                    self.halves[index][half][channel] = mine[channel][half] + others[channel][half];
+                }
+            }
         }
-        let stored = self.offsets.iter().find(|(stored, _)| *stored == aov);
-        let &(_, offset) = stored.expect("an AOV that the film keeps");
-        let channels = aov.channels().len();
-        let sums = &self.sums[self.window.index(pixel) * self.stride + offset..];
-        let count = sums[channels];
-        if aov == Aov::Depth && count == 0.0 {
-            return vec![NO_DEPTH];
+        self.sums.merge(&other.sums);
+        let counts = [
+            (&mut self.left_out, &other.left_out),
+            (&mut self.aovs_left_out, &other.aovs_left_out),
+        ];
+        for (counts, others) in counts {
+            for (count, other) in counts.iter_mut().zip(others) {
+                *count += other;
+            }
         }
-        sums[..channels]
-            .iter()
-            .map(|sum| if count > 0.0 { sum / count } else { 0.0 })
-            .collect()
+        for (fault, other) in self.faults.iter_mut().zip(&other.faults) {
+            fault.absorb(other);
+        }
+        self.taken = taken;
+        self.first = self.first.min(other.first);
+    }
+
+    /// Whether the sums can be those of so many samples, when they come from a file.
+    pub(super) fn is_possible(&self) -> bool {
+        let count = self.taken.count();
+        let halves = self.halves.as_flattened().as_flattened();
+        let counts = self.left_out.iter().zip(
+            self.aovs_left_out
+                .iter()
+                .copied()
+                .chain(std::iter::repeat(0)),
+        );
+        halves.iter().all(|half| half.is_finite())
+            && counts
+                .into_iter()
+                .all(|(&left_out, aovs)| left_out.checked_add(aovs).is_some_and(|sum| sum <= count))
     }
 
     pub(super) fn fault(&self, fault: Fault) -> &FaultCount {
@@ -359,6 +457,9 @@ impl FilmTile {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.colors.as_slice()) + size_of_val(self.sums.as_slice())
+        self.sums.bytes()
+            + size_of_val(self.halves.as_slice())
+            + size_of_val(self.left_out.as_slice())
+            + size_of_val(self.aovs_left_out.as_slice())
     }
 }

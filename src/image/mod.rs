@@ -8,7 +8,7 @@ pub(crate) mod planes;
 mod window;
 
 pub use exr::{ExrError, read_exr};
-pub use output::{OutputError, OutputPath};
+pub use output::{OutputError, OutputPath, check_output};
 pub use window::Window;
 
 pub(crate) use output::replace;

@@ -1,7 +1,7 @@
 //! Output files: checked before the render, whole after it.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Image, exr};
@@ -84,18 +84,7 @@ impl OutputPath {
     /// # Errors
     /// When [`Self::write`] could not succeed.
     pub fn check(&self) -> Result<(), OutputError> {
-        if self.path.is_dir() {
-            return Err(OutputError::IsFolder(self.path.clone()));
-        }
-        let folder = folder(&self.path);
-        let probe = temporary(&self.path);
-        let tried = fs::create_dir_all(folder)
-            .and_then(|()| File::create(&probe))
-            .and_then(|_| fs::remove_file(&probe));
-        tried.map_err(|source| OutputError::Folder {
-            folder: folder.to_owned(),
-            source,
-        })
+        check_output(&self.path)
     }
 
     /// Writes the image: scene-linear with all layers and attributes as EXR;
@@ -106,9 +95,12 @@ impl OutputPath {
     /// When the system refuses; a file that was there before stays.
     pub fn write(&self, image: &Image, exposure: f32) -> Result<(), OutputError> {
         match self.format {
-            Format::Exr => replace(&self.path, |file| {
-                exr::encode(image, file).map_err(|error| error.to_string())
-            }),
+            Format::Exr => {
+                let mut bytes = Cursor::new(Vec::new());
+                let encoded = exr::encode(image, &mut bytes);
+                encoded.map_err(|error| self.refused(&error))?;
+                replace(&self.path, bytes.get_ref())
+            }
             Format::Png => {
                 let size = [image.window.width, image.window.height];
                 self.write_rgb8(&image.to_srgb8(exposure), size)
@@ -124,39 +116,101 @@ impl OutputPath {
     pub fn write_rgb8(&self, pixels: &[u8], size: [u32; 2]) -> Result<(), OutputError> {
         use ::image::ImageEncoder;
         let [width, height] = size;
-        replace(&self.path, |file| {
-            ::image::codecs::png::PngEncoder::new(file)
-                .write_image(pixels, width, height, ::image::ExtendedColorType::Rgb8)
-                .map_err(|error| error.to_string())
-        })
+        let mut bytes = Vec::new();
+        let encoder = ::image::codecs::png::PngEncoder::new(&mut bytes);
+        encoder
+            .write_image(pixels, width, height, ::image::ExtendedColorType::Rgb8)
+            .map_err(|error| self.refused(&error))?;
+        replace(&self.path, &bytes)
+    }
+
+    fn refused(&self, error: &dyn std::error::Error) -> OutputError {
+        OutputError::Write {
+            path: self.path.clone(),
+            reason: error.to_string(),
+        }
     }
 }
 
-/// Writes a file under a temporary name beside `path` and renames it.
-pub(crate) fn replace(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
-) -> Result<(), OutputError> {
-    let temporary = temporary(path);
-    let written = File::create(&temporary)
-        .map_err(|error| error.to_string())
-        .and_then(|file| {
-            let mut file = BufWriter::new(file);
-            write(&mut file)?;
-            file.flush().map_err(|error| error.to_string())?;
-            file.get_ref().sync_all().map_err(|error| error.to_string())
-        });
-    if let Err(reason) = written {
+/// Whether a file can be written at `path`: makes its folder if there is none and
+/// tries to write into it.
+///
+/// # Errors
+/// When [`replace`] could not succeed.
+pub fn check_output(path: &Path) -> Result<(), OutputError> {
+    let place = Place::of(path);
+    let target = match &place {
+        Place::File(target) => target,
+        Place::Stream(_) => return Ok(()),
+    };
+    if target.is_dir() {
+        return Err(OutputError::IsFolder(path.to_owned()));
+    }
+    let probe = temporary(target);
+    let tried = create_new(&probe).and_then(|_| fs::remove_file(&probe));
+    tried.map_err(|source| OutputError::Folder {
+        folder: folder(target).to_owned(),
+        source,
+    })
+}
+
+/// Puts a file of these bytes at `path`: under a temporary name beside it first, on disk
+/// before it is renamed, so that there is either the old file or all of the new one,
+/// whatever happens. Where a symbolic link leads is replaced, not the link; pipes and
+/// devices are written to.
+///
+/// # Errors
+/// When the system refuses; a file that was there before stays.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let failed = |error: std::io::Error| OutputError::Write {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    };
+    let target = match Place::of(path) {
+        Place::File(target) => target,
+        Place::Stream(stream) => {
+            let file = File::options().write(true).open(stream);
+            return file
+                .and_then(|mut file| file.write_all(bytes))
+                .map_err(failed);
+        }
+    };
+    let temporary = temporary(&target);
+    let written = create_new(&temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    if let Err(error) = written {
         // Best effort: the error that matters is the one at hand.
         let _ = fs::remove_file(&temporary);
-        let path = path.to_owned();
-        return Err(OutputError::Write { path, reason });
+        return Err(failed(error));
     }
-    fs::rename(&temporary, path).map_err(|source| OutputError::Rename {
+    fs::rename(&temporary, &target).map_err(|source| OutputError::Rename {
         temporary,
         path: path.to_owned(),
         source,
-    })
+    })?;
+    // The new name is on disk with its folder; not all systems can say so.
+    let _ = File::open(folder(&target)).and_then(|folder| folder.sync_all());
+    Ok(())
+}
+
+/// What is at the name of an output.
+enum Place {
+    /// A regular file, or nothing so far; where links lead.
+    File(PathBuf),
+    /// A pipe or a device.
+    Stream(PathBuf),
+}
+
+impl Place {
+    fn of(path: &Path) -> Self {
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        match fs::metadata(&target) {
+            Ok(found) if !found.is_file() && !found.is_dir() => Self::Stream(target),
+            _ => Self::File(target),
+        }
+    }
 }
 
 fn folder(path: &Path) -> &Path {
@@ -166,9 +220,20 @@ fn folder(path: &Path) -> &Path {
     }
 }
 
-/// A name in the same folder, hence on the same file system, that no other
-/// process uses.
+/// Makes a file, and its folder if there is none, in place of what a process that was
+/// killed has left there. It follows no link.
+fn create_new(path: &Path) -> std::io::Result<File> {
+    fs::create_dir_all(folder(path))?;
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    File::create_new(path)
+}
+
+/// A name in the same folder, hence on the same file system, which the next output of
+/// this name takes again.
 fn temporary(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    folder(path).join(format!(".{name}.{}.part", std::process::id()))
+    folder(path).join(format!(".{name}.part"))
 }

@@ -1,9 +1,14 @@
 //! The kernels: the path tracer, compiled for a few sets of features.
 
 use crate::features::Features;
+use crate::film::FilmTile;
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::render::{Job, render_pass};
+use super::pass::{Integrator, Job, pilots, samples};
+use super::path::{PathResult, PathTracer, Split};
+use super::split::{Cells, Pilot};
+use crate::embree::Ray;
 
 /// Lambertian surfaces under a constant world, or shining themselves: nothing
 /// to sample.
@@ -42,7 +47,44 @@ const STUDIO: Features = GLASS
     .with(Features::DEPTH_OF_FIELD);
 const EVERYTHING: Features = Features::EVERYTHING;
 
-type Pass = fn(&Job<'_>, &mut [crate::film::FilmTile]) -> u64;
+impl<const F: u32> Integrator for PathTracer<'_, F> {
+    const FEATURES: Features = Features::from_bits(F);
+
+    #[inline]
+    fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult {
+        Self::trace(self, ray, sampler, split)
+    }
+}
+
+/// What a kernel does.
+#[derive(Clone, Copy)]
+pub(super) struct Kernel {
+    /// Adds a job's samples to every tile; returns the rays traced.
+    pub samples: fn(&Job<'_>, &mut [FilmTile]) -> u64,
+    /// Traces the pilot paths of these cells.
+    pub pilots: fn(&Job<'_>, &Cells) -> Vec<Pilot>,
+}
+
+impl Kernel {
+    const fn new<const F: u32>() -> Self {
+        Self {
+            samples: |job, tiles| {
+                samples(
+                    &PathTracer::<F>::new(job.scene, job.settings, false),
+                    job,
+                    tiles,
+                )
+            },
+            pilots: |job, cells| {
+                pilots(
+                    &PathTracer::<F>::new(job.scene, job.settings, true),
+                    job,
+                    cells,
+                )
+            },
+        }
+    }
+}
 
 /// Every kernel there is, from the leanest to the one with everything.
 pub const KERNELS: &[Features] = &[
@@ -50,16 +92,16 @@ pub const KERNELS: &[Features] = &[
 ];
 
 /// The same list as code; the test below holds the two together.
-const PASSES: &[Pass] = &[
-    render_pass::<{ PLAIN.bits() }>,
-    render_pass::<{ LIT.bits() }>,
-    render_pass::<{ METAL.bits() }>,
-    render_pass::<{ FURNACE.bits() }>,
-    render_pass::<{ ROOM.bits() }>,
-    render_pass::<{ GLASS.bits() }>,
-    render_pass::<{ TEXTURED.bits() }>,
-    render_pass::<{ STUDIO.bits() }>,
-    render_pass::<{ EVERYTHING.bits() }>,
+const CODE: &[Kernel] = &[
+    Kernel::new::<{ PLAIN.bits() }>(),
+    Kernel::new::<{ LIT.bits() }>(),
+    Kernel::new::<{ METAL.bits() }>(),
+    Kernel::new::<{ FURNACE.bits() }>(),
+    Kernel::new::<{ ROOM.bits() }>(),
+    Kernel::new::<{ GLASS.bits() }>(),
+    Kernel::new::<{ TEXTURED.bits() }>(),
+    Kernel::new::<{ STUDIO.bits() }>(),
+    Kernel::new::<{ EVERYTHING.bits() }>(),
 ];
 
 /// Index of the leanest kernel that has all of these features.
@@ -71,14 +113,14 @@ pub fn kernel_for(features: Features) -> usize {
         .expect("the last kernel has everything")
 }
 
-/// The pass function for a scene, specialised or with everything in.
-pub(super) fn pass_for(scene: &Scene, all_in: bool) -> (Features, Pass) {
+/// The kernel for a scene, specialised or with everything in.
+pub(super) fn for_scene(scene: &Scene, all_in: bool) -> (Features, Kernel) {
     let index = if all_in {
         KERNELS.len() - 1
     } else {
         kernel_for(scene.features)
     };
-    (KERNELS[index], PASSES[index])
+    (KERNELS[index], CODE[index])
 }
 
 #[cfg(test)]
@@ -87,7 +129,7 @@ mod tests {
 
     #[test]
     fn kernels_grow_and_the_last_has_everything() {
-        assert_eq!(KERNELS.len(), PASSES.len());
+        assert_eq!(KERNELS.len(), CODE.len());
         assert_eq!(kernel_for(Features::NONE), 0);
         assert_eq!(kernel_for(EVERYTHING), KERNELS.len() - 1);
         for pair in KERNELS.windows(2) {

@@ -1,10 +1,13 @@
 //! From a scene to a film: which paths are traced, by which kernel, until when.
 
 mod kernel;
+mod pass;
 mod path;
 mod render;
+mod split;
 mod sum;
 
 pub use kernel::{KERNELS, kernel_for};
 pub use path::{FirstHit, PathResult, PathTracer, Split};
-pub use render::{Control, Progress, RenderError, RenderReport, Stop, begun, render};
+pub use render::{Checkpoint, Control, Progress, RenderError, RenderReport, Stop, render};
+pub use split::Spread;

@@ -10,12 +10,13 @@ use crate::bsdf::{Bsdf, ByOrder, InLanes, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
-use crate::film::{Aov, Sample, Spread};
+use crate::film::{Aov, Sample};
 use crate::light::{EmitterId, LightSample, Receiver};
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{RenderSettings, Scene, Surface, View};
 use smithwalk_model::LANES;
 
+use super::split::Spread;
 use super::sum::{Sum, mean};
 
 /// Surfaces that a ray may pass straight through before it counts as stuck.
@@ -67,14 +68,15 @@ impl PathResult {
     /// into the depth along the view axis.
     #[must_use]
     pub fn to_sample(self, depth_scale: f32) -> Sample {
-        let first = self.first;
-        Sample {
-            color: self.radiance.total().to_array(),
-            albedo: first.map_or([0.0; 3], |f| f.albedo.to_array()),
-            normal: first.map_or([0.0; 3], |f| f.normal.to_array()),
-            depth: first.map(|f| f.distance * depth_scale),
-            single: self.radiance.single.to_array(),
-            multiple: self.radiance.multiple.to_array(),
+        let sample = Sample::of(self.radiance.total().to_array())
+            .with(Aov::Single, self.radiance.single.to_array())
+            .with(Aov::Multiple, self.radiance.multiple.to_array());
+        match self.first {
+            Some(first) => sample
+                .with(Aov::Albedo, first.albedo.to_array())
+                .with(Aov::Normal, first.normal.to_array())
+                .with(Aov::Depth, [first.distance * depth_scale; 3]),
+            None => sample,
         }
     }
 }

@@ -1,17 +1,13 @@
-//! Passes over the film, in parallel over its tiles, until a limit is reached.
+//! From a scene to a film: pilots, then passes over the film until a limit is reached.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use arrayvec::ArrayVec;
-use rayon::prelude::*;
-
-use super::kernel::pass_for;
-use super::path::{PathTracer, Split};
-use crate::camera::Camera;
-use crate::features::{Features, has};
-use crate::film::{Draws, Film, FilmTile, Spread};
-use crate::sampler::{Dimension, Sampler};
+use super::kernel::{self, Kernel};
+use super::pass::Job;
+use super::split::{Plan, pass_length};
+use crate::features::Features;
+use crate::film::Film;
 use crate::scene::{RenderSettings, Scene};
 
 /// Why rendering ended.
@@ -30,12 +26,14 @@ pub enum Stop {
 /// How far it is.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Samples per pixel so far.
-    pub spp: u32,
+    /// Samples per pixel so far, on average over the film.
+    pub spp: f64,
     /// How many there will be if nothing else stops it.
     pub target: u32,
     /// Time since the start.
     pub elapsed: Duration,
+    /// Estimated relative error after the last pass, if it was looked at.
+    pub noise: Option<f64>,
 }
 
 /// What was done.
@@ -60,78 +58,8 @@ pub struct RenderReport {
 /// The least samples per pixel before an error estimate is believed.
 const MIN_SPP_FOR_NOISE: u32 = 16;
 
-/// Samples per pixel with equally many branches everywhere, by which those of
-/// the others are decided.
-const PILOT_SAMPLES: u32 = 4;
-
-/// Samples per pixel by which the camera rays of the others are decided.
-const OUTLINE_SAMPLES: u32 = 5;
-
-/// Between two looks at the clock, at most this share of the time limit.
-const TIME_SLICE: f64 = 0.05;
-
-/// One pass over the film.
-pub(super) struct Job<'a> {
-    scene: &'a Scene,
-    settings: &'a RenderSettings,
-    camera: &'a Camera,
-    /// Samples `first .. first + count` of every pixel.
-    first: u32,
-    count: u32,
-    /// Whether the film takes note of how samples differ within themselves.
-    pilot: bool,
-}
-
-impl Job<'_> {
-    /// How camera path number `index` of a pixel splits, given what was planned for it.
-    /// The draws of a pixel are numbered on through its paths.
-    fn split(&self, planned: Draws, index: u32) -> Split {
-        let pilot = if splits(self.settings) {
-            Draws::PILOT
-        } else {
-            Draws::ONE
-        };
-        let piloted = if planned == Draws::UNPLANNED {
-            u32::MAX
-        } else if exceeds_pilot(planned) {
-            0
-        } else {
-            PILOT_SAMPLES
-        };
-        let numbers = |pilot: u32, planned: u32| {
-            let first = index.min(piloted) * pilot + index.saturating_sub(piloted) * planned;
-            let count = if index < piloted { pilot } else { planned };
-            first..first + count
-        };
-        Split {
-            light_samples: numbers(pilot.light_samples, planned.light_samples),
-            branches: numbers(pilot.branches, planned.branches),
-        }
-    }
-}
-
-/// Whether paths split at all; plain ones need neither pilots nor a plan.
-fn splits(settings: &RenderSettings) -> bool {
-    settings.branches != Some(1)
-}
-
-/// How many of a film's samples per pixel [`render`] goes on from: all, or none when
-/// they are too few to know how paths are to split. What those tell about the others is
-/// not kept with them.
-pub fn begun(settings: &RenderSettings, film: &Film) -> u32 {
-    match film.samples_per_pixel() {
-        ..OUTLINE_SAMPLES if splits(settings) => 0,
-        samples => samples,
-    }
-}
-
-/// Whether the pilot samples of a pixel are too coarse to be averaged with the
-/// others: all samples have the same weight.
-fn exceeds_pilot(planned: Draws) -> bool {
-    planned.camera_rays > Draws::PILOT.camera_rays
-        || planned.light_samples > Draws::PILOT.light_samples
-        || planned.branches > Draws::PILOT.branches
-}
+/// How often progress is told within a pass.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Why nothing can be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -145,16 +73,31 @@ pub enum RenderError {
 /// of the rayon pool that it is called in.
 #[derive(Default)]
 pub struct Control<'a> {
-    /// Becomes true when somebody wants the render to end.
+    /// Becomes true when somebody wants the render to end. It does so within the time
+    /// that a thread needs for a sample of each pixel of a tile.
     pub interrupt: Option<&'a AtomicBool>,
-    /// Is called before each pass and at the end.
-    pub progress: Option<&'a mut dyn FnMut(Progress)>,
+    /// Is told how far it is, by any thread, a few times a second.
+    pub progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+    /// When to save the film on the way.
+    pub checkpoint: Option<Checkpoint<'a>>,
 }
 
-/// Renders into `film`, which may have samples already: they are counted and
-/// continued, see [`begun`]. The image depends on scene, seed and number of samples alone,
-/// not on threads or passes. When somebody interrupts the render, the current pass is
-/// finished first, so that all pixels have equally many samples.
+/// Saves a film during a render.
+pub struct Checkpoint<'a> {
+    /// Time between two of them, if they are to come by themselves.
+    pub interval: Option<Duration>,
+    /// Becomes true when somebody wants one now; is set back then.
+    pub now: &'a AtomicBool,
+    /// Saves it. The tiles of the film may have different numbers of samples.
+    pub save: &'a mut dyn FnMut(&Film),
+}
+
+/// Renders into `film`, which may have samples already: those that are missing are
+/// added. The image depends on scene, settings and samples alone, not on threads,
+/// passes, interruptions, or what else is rendered of it.
+///
+/// An interrupted film may have more samples in some tiles than in others; a further
+/// call goes on from them.
 ///
 /// # Errors
 /// When the scene has no camera.
@@ -167,177 +110,176 @@ pub fn render(
     film: &mut Film,
     mut control: Control<'_>,
 ) -> Result<RenderReport, RenderError> {
-    let start = Instant::now();
     assert!(
         film.window() == settings.window && film.aovs() == settings.aovs,
         "the film is of another layout"
     );
     let camera = scene.camera.as_ref().ok_or(RenderError::NoCamera)?;
+    let (features, Kernel { samples, pilots }) = kernel::for_scene(scene, settings.all_in);
     let limits = settings.limits;
-    let (kernel, pass) = pass_for(scene, settings.all_in);
-    let splits = splits(settings);
-    let begun = begun(settings, film);
-    if begun < film.samples_per_pixel() {
-        *film = settings.film();
-    }
-    let mut progress = |progress| {
-        if let Some(watch) = &mut control.progress {
-            watch(progress);
-        }
+    let first = settings.share.start;
+    let target = limits.spp.min(settings.share.end).saturating_sub(first);
+    let watch = Watch::new(&control, film, target);
+
+    let unplanned = Plan::default();
+    let mut job = Job {
+        scene,
+        settings,
+        camera,
+        plan: &unplanned,
+        end: first,
+        leave_off: &|_| watch.interrupted(),
     };
-    let mut spp = begun;
-    let mut rays = 0;
+    let pilot_rays = AtomicU64::new(0);
+    let plan = Plan::new(settings, |cells| {
+        let found = pilots(&job, cells);
+        let rays = found.iter().map(|pilot| u64::from(pilot.rays)).sum();
+        pilot_rays.fetch_add(rays, Ordering::Relaxed);
+        found
+    });
+    job.plan = &plan;
+    let mut rays = pilot_rays.into_inner();
+
+    let begun = film.samples_per_pixel();
     let mut noise = None;
-    let mut scale = 0.0;
-    let mut stop = Stop::Samples;
     let mut slowest_sample = Duration::ZERO;
-    while spp < limits.spp {
-        let elapsed = start.elapsed();
-        progress(Progress {
-            spp,
-            target: limits.spp,
-            elapsed,
-        });
-        if control
-            .interrupt
-            .is_some_and(|flag| flag.load(Ordering::Relaxed))
-        {
-            stop = Stop::Interrupted;
-            break;
+    let stop = loop {
+        let spp = film.samples_per_pixel();
+        watch.tell(noise);
+        if watch.interrupted() {
+            break Stop::Interrupted;
         }
-        if limits
-            .time
-            .is_some_and(|t| spp > begun && elapsed + slowest_sample > t)
-        {
-            stop = Stop::Time;
-            break;
+        if spp >= target {
+            break Stop::Samples;
         }
-        let mut count = pass_length(spp - begun, limits.spp - spp, limits.time, slowest_sample);
-        let pilot = splits && spp < OUTLINE_SAMPLES;
-        if pilot {
-            let planned = if spp < PILOT_SAMPLES {
-                PILOT_SAMPLES
-            } else {
-                OUTLINE_SAMPLES
-            };
-            count = count.min(planned - spp);
+        let elapsed = watch.start.elapsed();
+        let late = |time| spp > begun && elapsed + slowest_sample > time;
+        if limits.time.is_some_and(late) {
+            break Stop::Time;
         }
-        let job = Job {
-            scene,
-            settings,
-            camera,
-            pilot,
-            first: spp,
-            count,
+        let count = pass_length(spp - begun, target - spp, limits.time, slowest_sample);
+        let pass = Job {
+            end: first + spp + count,
+            leave_off: &|pixels| watch.look(pixels),
+            ..job
         };
         let pass_start = Instant::now();
-        rays += pass(&job, film.tiles_mut());
-        spp += count;
+        rays += samples(&pass, film.tiles_mut());
         slowest_sample = slowest_sample.max(pass_start.elapsed() / count);
-        if pilot && spp == PILOT_SAMPLES {
-            scale = film.plan(settings.branches);
+        if let (true, Some(checkpoint)) = (watch.save_is_due(), &mut control.checkpoint) {
+            (checkpoint.save)(film);
+            watch.saved();
         }
-        if pilot && spp == OUTLINE_SAMPLES {
-            film.plan_camera_rays(scale);
-        }
-        if let Some(target) = limits.noise {
+        if let (Some(target), true) = (limits.noise, film.samples_per_pixel() > spp) {
             noise = film.relative_error();
-            if spp >= MIN_SPP_FOR_NOISE && noise.is_some_and(|n| n <= target) {
-                stop = Stop::Noise;
-                break;
+            let believed = film.samples_per_pixel() >= MIN_SPP_FOR_NOISE;
+            if believed && noise.is_some_and(|n| n <= target) {
+                break Stop::Noise;
             }
         }
-    }
-    progress(Progress {
-        spp,
-        target: limits.spp,
-        elapsed: start.elapsed(),
-    });
+    };
+    let spp = film.samples_per_pixel();
     Ok(RenderReport {
         spp,
         added: spp - begun,
-        wall: start.elapsed(),
+        wall: watch.start.elapsed(),
         rays,
         stop,
-        noise: noise.or_else(|| film.relative_error()),
-        kernel,
+        noise: film.relative_error(),
+        kernel: features,
     })
 }
 
-/// Samples per pixel of the next pass: doubling from one, so that early
-/// interrupts are quick and late passes are long enough to keep threads busy.
-fn pass_length(done: u32, left: u32, time: Option<Duration>, sample: Duration) -> u32 {
-    let doubling = done.clamp(1, 64).min(left);
-    match time {
-        Some(time) if !sample.is_zero() => {
-            let slice = (time.as_secs_f64() * TIME_SLICE / sample.as_secs_f64()) as u32;
-            doubling.min(slice.max(1))
+/// What threads look at while they render.
+struct Watch<'a> {
+    start: Instant,
+    interrupt: Option<&'a AtomicBool>,
+    progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+    save_now: Option<&'a AtomicBool>,
+    save_interval: Option<Duration>,
+    /// Of the last save, milliseconds since the start.
+    saved: AtomicU64,
+    target: u32,
+    /// Pixels of the film.
+    pixels: u64,
+    /// Samples of all pixels so far.
+    samples: AtomicU64,
+    /// Of the last progress, milliseconds since the start.
+    told: AtomicU64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(control: &Control<'a>, film: &Film, target: u32) -> Self {
+        let pixels = |tile: &crate::film::FilmTile| tile.window().area() as u64;
+        let samples = |tile| pixels(tile) * u64::from(tile.taken().count());
+        let start = Instant::now();
+        Self {
+            start,
+            interrupt: control.interrupt,
+            progress: control.progress,
+            save_now: control.checkpoint.as_ref().map(|c| c.now),
+            save_interval: control.checkpoint.as_ref().and_then(|c| c.interval),
+            saved: AtomicU64::new(0),
+            target,
+            pixels: film.tiles().iter().map(pixels).sum(),
+            samples: AtomicU64::new(film.tiles().iter().map(samples).sum()),
+            told: AtomicU64::new(0),
         }
-        _ => doubling,
     }
-}
 
-/// Adds the job's samples to every tile; returns the rays traced.
-pub(super) fn render_pass<const F: u32>(job: &Job<'_>, tiles: &mut [FilmTile]) -> u64 {
-    let tracer = PathTracer::<F>::new(job.scene, job.settings, job.pilot);
-    tiles
-        .par_iter_mut()
-        // A few tiles can cost most of a pass: none waits behind another.
-        .with_max_len(1)
-        .map(|tile| {
-            let mut rays = 0;
-            for pixel in tile.window().pixels() {
-                let planned = tile.draws(pixel);
-                let anew = job.first == PILOT_SAMPLES && exceeds_pilot(planned)
-                    || job.first == OUTLINE_SAMPLES && planned.camera_rays > 1;
-                if anew {
-                    tile.clear(pixel);
-                }
-                let first = if anew { 0 } else { job.first };
-                for sample in first..job.first + job.count {
-                    rays += u64::from(render_sample(&tracer, job, pixel, sample, tile));
-                }
-            }
-            rays
-        })
-        .sum()
-}
+    fn interrupted(&self) -> bool {
+        self.interrupt
+            .is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
 
-/// Adds sample number `index` of a pixel; returns the rays traced.
-fn render_sample<const F: u32>(
-    tracer: &PathTracer<'_, F>,
-    job: &Job<'_>,
-    pixel: [u32; 2],
-    index: u32,
-    tile: &mut FilmTile,
-) -> u32 {
-    let RenderSettings { filter, seed, .. } = job.settings;
-    let planned = tile.draws(pixel);
-    // One before anything is planned.
-    let camera_rays = planned.camera_rays.max(1);
-    let mut paths = ArrayVec::<_, { Draws::MOST as usize }>::new();
-    let mut spreads = [Spread::default(); 2];
-    let mut rays = 0;
-    for path in index * camera_rays..(index + 1) * camera_rays {
-        let mut sampler = Sampler::new(*seed, pixel, path);
-        let [dx, dy] = filter.offset(sampler.get_2d(Dimension::camera_pixel()));
-        let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
-        let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
-            sampler.get_2d(Dimension::lens())
-        } else {
-            [0.5; 2]
-        };
-        let ray = job.camera.ray(raster, lens);
-        // Depth counts along the view axis, not along the ray.
-        let depth_scale = ray.direction.dot(job.camera.forward());
-        let result = tracer.trace(ray, &mut sampler, job.split(planned, path));
-        rays += result.rays;
-        paths.push(result.to_sample(depth_scale));
-        spreads = [result.light_samples, result.branches];
+    fn save_is_due(&self) -> bool {
+        let now = self
+            .save_now
+            .is_some_and(|flag| flag.load(Ordering::Relaxed));
+        let last = Duration::from_millis(self.saved.load(Ordering::Relaxed));
+        let late = |interval| self.start.elapsed() >= last + interval;
+        now || self.save_interval.is_some_and(late)
     }
-    if tile.add(pixel, &paths) && job.pilot {
-        let [light_samples, branches] = spreads;
-        tile.add_pilot(pixel, light_samples, branches);
+
+    fn saved(&self) {
+        let now = self.start.elapsed().as_millis() as u64;
+        self.saved.store(now, Ordering::Relaxed);
+        if let Some(flag) = self.save_now {
+            flag.store(false, Ordering::Relaxed);
+        }
     }
-    rays
+
+    /// Before a thread takes a sample of so many pixels: whether it is to leave off.
+    fn look(&self, pixels: u64) -> bool {
+        if self.interrupted() || self.save_is_due() {
+            return true;
+        }
+        self.samples.fetch_add(pixels, Ordering::Relaxed);
+        let now = self.start.elapsed();
+        let told = self.told.load(Ordering::Relaxed);
+        let due = now.as_millis() as u64 >= told + PROGRESS_INTERVAL.as_millis() as u64;
+        let now_ms = now.as_millis() as u64;
+        // One thread alone gets through.
+        let ordering = Ordering::Relaxed;
+        if due
+            && self
+                .told
+                .compare_exchange(told, now_ms, ordering, ordering)
+                .is_ok()
+        {
+            self.tell(None);
+        }
+        false
+    }
+
+    fn tell(&self, noise: Option<f64>) {
+        if let Some(progress) = self.progress {
+            progress(Progress {
+                spp: self.samples.load(Ordering::Relaxed) as f64 / self.pixels as f64,
+                target: self.target,
+                elapsed: self.start.elapsed(),
+                noise,
+            });
+        }
+    }
 }

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::path::PathResult;
+use super::split::Spread;
 use crate::bsdf::ByOrder;
 use crate::color::Rgb;
-use crate::film::Spread;
 use crate::sampler::Sampler;
 
 /// The mean of what `trace` finds for these indices of `sampler`, and how that

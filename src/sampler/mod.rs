@@ -25,11 +25,15 @@ use smithwalk_model::Draw;
 /// one, scrambled afresh.
 const LOG2_SEQUENCE: u32 = 16;
 
-/// Sets of dimensions that belong to the camera.
-const CAMERA_SETS: u32 = 1;
-/// Sets of dimensions that belong to each path vertex: light and closure,
-/// BSDF, roulette, and the walk of a light connection.
-const VERTEX_SETS: u32 = 4;
+/// Sets of dimensions that belong to the camera: film and lens, time, pilots. A set that
+/// nobody draws from costs nothing, so there are some for what is to come: whoever needs
+/// one shifts no other number and changes no image that does without.
+const CAMERA_SETS: u32 = 16;
+/// Sets of dimensions that belong to each path vertex: light and closure, BSDF,
+/// roulette, the walk of a light connection, choices among layers, the descent of a
+/// light tree, the way through a medium, the way of a light connection through one. The
+/// same holds for the rest.
+const VERTEX_SETS: u32 = 64;
 
 /// The address of a random number within a sample.
 ///
@@ -60,6 +64,16 @@ impl Dimension {
         Self { set: 0, lane: 2 }
     }
 
+    /// The moment between opening and closing of the shutter, one number.
+    pub const fn time() -> Self {
+        Self { set: 1, lane: 0 }
+    }
+
+    /// Which pixel of its cell a pilot path goes through, two numbers.
+    pub const fn pilot_pixel() -> Self {
+        Self { set: 2, lane: 0 }
+    }
+
     /// Which light to connect to, one number.
     pub const fn light_choice(bounce: u32) -> Self {
         Self::vertex(bounce, 0, 0)
@@ -85,6 +99,28 @@ impl Dimension {
     /// Whether the path goes on, one number.
     pub const fn roulette(bounce: u32) -> Self {
         Self::vertex(bounce, 2, 0)
+    }
+
+    /// Choices among the closures of a surface beyond [`Self::closure_choice`], four
+    /// numbers.
+    pub const fn layers(bounce: u32) -> Self {
+        Self::vertex(bounce, 4, 0)
+    }
+
+    /// Choices on the way down a light tree, four numbers.
+    pub const fn light_tree(bounce: u32) -> Self {
+        Self::vertex(bounce, 5, 0)
+    }
+
+    /// The way through a medium behind the vertex: distance, channel, direction, four
+    /// numbers.
+    pub const fn medium(bounce: u32) -> Self {
+        Self::vertex(bounce, 6, 0)
+    }
+
+    /// The way of a light connection through media, four numbers.
+    pub const fn medium_light(bounce: u32) -> Self {
+        Self::vertex(bounce, 7, 0)
     }
 }
 
@@ -140,6 +176,12 @@ impl Sampler {
         };
         sampler.set_index(sample);
         sampler
+    }
+
+    /// The numbers of pilot paths through a cell of pixels (column, row from the top left
+    /// of the full image): others than those of any sample.
+    pub fn pilot(seed: u64, cell: [u32; 2]) -> Self {
+        Self::new(mix(seed), cell, 0)
     }
 
     /// Goes on with another sample of the pixel, for all dimensions that are
@@ -399,13 +441,22 @@ mod tests {
 
     /// Every dimension of the first two vertices, by name.
     fn layout() -> Vec<(Dimension, usize)> {
-        let mut all = vec![(Dimension::camera_pixel(), 2), (Dimension::lens(), 2)];
+        let mut all = vec![
+            (Dimension::camera_pixel(), 2),
+            (Dimension::lens(), 2),
+            (Dimension::time(), 1),
+            (Dimension::pilot_pixel(), 2),
+        ];
         for bounce in 0..2 {
             all.push((Dimension::light_choice(bounce), 1));
             all.push((Dimension::light_position(bounce), 2));
             all.push((Dimension::closure_choice(bounce), 1));
             all.push((Dimension::bsdf(bounce), 4));
             all.push((Dimension::roulette(bounce), 1));
+            all.push((Dimension::layers(bounce), 4));
+            all.push((Dimension::light_tree(bounce), 4));
+            all.push((Dimension::medium(bounce), 4));
+            all.push((Dimension::medium_light(bounce), 4));
         }
         all
     }

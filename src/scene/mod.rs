@@ -2,6 +2,7 @@
 //! quantities for the file's units, nothing that no ray asks for.
 
 mod compile;
+mod identity;
 mod load;
 mod material;
 mod resolve;

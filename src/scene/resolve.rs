@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::compile::Materials;
+use super::identity::identity;
 use super::load::Assets;
 use super::transform::to_affine;
 use super::{Material, Object, RenderSettings, Scene, SceneMesh};
@@ -14,6 +15,7 @@ use crate::color::Rgb;
 use crate::description::{Assignment, Description, Transform};
 use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
 use crate::features::Features;
+use crate::film::Identity;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::memory::Budget;
 use crate::mesh::Mesh;
@@ -41,6 +43,8 @@ pub struct Resolved {
     pub scene: Scene,
     /// As the description has them.
     pub settings: RenderSettings,
+    /// What decides about its samples.
+    pub identity: Identity,
     /// Repairs of input files and things that were left out, for people.
     pub repairs: Vec<String>,
 }
@@ -84,6 +88,7 @@ fn build(
     materials: Materials<'_>,
     budget: &Budget,
 ) -> Result<Resolved, ResolveError> {
+    let identity = identity(description, &assets);
     let mut problems = Vec::new();
     let Assets {
         meshes,
@@ -207,6 +212,7 @@ fn build(
     Ok(Resolved {
         scene,
         settings: RenderSettings::new(description),
+        identity,
         repairs,
     })
 }

@@ -1,6 +1,7 @@
 //! What is rendered of a scene, how far, and how: all that decides about an image
 //! beside the scene itself.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use crate::description::{Description, Filter};
@@ -10,7 +11,8 @@ use crate::image::Window;
 /// When to stop. Whatever is reached first counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Samples per pixel, those of a resumed film included.
+    /// Samples per pixel of the whole image, those of a resumed film and of other parts
+    /// included.
     pub spp: u32,
     /// Wall-clock time.
     pub time: Option<Duration>,
@@ -43,6 +45,8 @@ pub struct RenderSettings {
     pub aovs: AovSet,
     /// Another seed gives another, independent image.
     pub seed: u64,
+    /// Indices of the samples that are this render's part of the image.
+    pub share: Range<u32>,
     /// When to stop.
     pub limits: Limits,
     /// In stops; for PNG alone.
@@ -74,6 +78,7 @@ impl RenderSettings {
             },
             aovs: film.aovs.iter().copied().collect(),
             seed: sampling.seed,
+            share: 0..u32::MAX,
             limits: Limits::samples(sampling.spp),
             exposure: film.exposure,
             max_bounces: sampling.max_bounces,
@@ -86,6 +91,8 @@ impl RenderSettings {
     /// An empty film for the window, which must lie within the image.
     #[must_use]
     pub fn film(&self) -> Film {
-        Film::new(self.resolution, self.window, self.aovs)
+        let mut film = Film::new(self.resolution, self.window, self.aovs);
+        film.set_share(self.share.clone());
+        film
     }
 }

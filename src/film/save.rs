@@ -1,0 +1,349 @@
+//! Saving a film between runs and for other machines, bit by bit.
+//!
+//! Layout, integers little-endian: 16 magic bytes; the length of the header (u32) and
+//! the header, JSON of [`Header`]; then per tile the ranges of its samples (a u32 count
+//! and 2 × u32 each), its sums, its halves (6 × f32 per pixel), the samples left out
+//! (u32 per pixel, and again for AOVs if there are any), and its faults (per cause a u64
+//! count, a u32 number of pixels and 2 × u32 each); last the XXH3 of all that (u128).
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::exact::ExactSums;
+use super::tile::{FAULT_PIXELS, FilmTile};
+use super::{Aov, AovSet, Film, Taken};
+use crate::image::{OutputError, Window, replace};
+
+const MAGIC: &[u8; 16] = b"smithwalk film\0\x06";
+
+/// Longer headers are refused: a scene of 10⁶ objects stays below.
+const LONGEST_HEADER: usize = 1 << 28;
+
+/// What decides about the samples of a film, named, each as a hash or a short value:
+/// two films with the same have samples of the same image.
+pub type Identity = BTreeMap<String, String>;
+
+/// Why a saved film can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FilmError {
+    /// There is no such file, or it can't be read.
+    #[error("can't read {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Not a film, one of another version, cut off, or damaged.
+    #[error("{} is no film of this version: {reason}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A render of something else.
+    #[error("{} is of another render: {difference}", path.display())]
+    OtherRender {
+        /// The file.
+        path: PathBuf,
+        /// How it differs.
+        difference: String,
+    },
+}
+
+/// What a saved film is of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// See [`Identity`].
+    pub identity: Identity,
+    /// Samples per pixel that the whole render is to have.
+    pub target: u32,
+    resolution: [u32; 2],
+    /// Left, top, width, height.
+    window: [u32; 4],
+    aovs: Vec<Aov>,
+    /// The samples that it is to have.
+    share: [u32; 2],
+}
+
+impl Header {
+    /// How the images of two films differ, for people; `None` when they don't.
+    pub fn layout_difference(&self, other: &Self) -> Option<String> {
+        if (self.resolution, self.window) != (other.resolution, other.window) {
+            Some("it has another resolution or crop".to_owned())
+        } else if self.aovs != other.aovs {
+            Some("it has other AOVs".to_owned())
+        } else if self.target != other.target {
+            let [theirs, ours] = [self.target, other.target];
+            Some(format!(
+                "it is a part of {theirs} samples per pixel, not of {ours}"
+            ))
+        } else {
+            None
+        }
+    }
+}
+
+/// A film from a file.
+#[derive(Clone, Debug)]
+pub struct SavedFilm {
+    /// The file.
+    pub path: PathBuf,
+    /// What it is of.
+    pub header: Header,
+    /// The sums.
+    pub film: Film,
+}
+
+/// Where the film behind an image file is saved: `image.exr.film`.
+pub fn sidecar_path(image: &Path) -> PathBuf {
+    let mut name = image.as_os_str().to_owned();
+    name.push(".film");
+    name.into()
+}
+
+/// How two identities differ, for people: at most a few names; `None` when they don't.
+pub fn difference(theirs: &Identity, ours: &Identity) -> Option<String> {
+    const NAMED: usize = 4;
+    let names = theirs
+        .keys()
+        .chain(ours.keys().filter(|key| !theirs.contains_key(*key)));
+    let differing: Vec<String> = names
+        .filter_map(|name| {
+            // Hashes say nothing to people, short values do.
+            let shown = |value: &String| value.len() < 20;
+            match (theirs.get(name), ours.get(name)) {
+                (Some(theirs), Some(ours)) if theirs == ours => None,
+                (Some(theirs), Some(ours)) if shown(theirs) && shown(ours) => {
+                    Some(format!("{name} {theirs}, not {ours}"))
+                }
+                (Some(_), Some(_)) => Some(format!("another {name}")),
+                (Some(_), None) => Some(format!("{name}, which is not there now")),
+                (None, _) => Some(format!("no {name}")),
+            }
+        })
+        .collect();
+    let more = differing.len().saturating_sub(NAMED);
+    match differing.len() {
+        0 => None,
+        1..=NAMED => Some(format!("it has {}", differing.join("; "))),
+        _ => Some(format!(
+            "it has {}; and {more} more differences",
+            differing[..NAMED].join("; ")
+        )),
+    }
+}
+
+impl Film {
+    /// Saves the accumulators, all bits of them, as a film of a render of this identity
+    /// that is to have `target` samples per pixel.
+    ///
+    /// # Errors
+    /// When the file can't be written; one that was there before stays.
+    pub fn save(&self, path: &Path, identity: &Identity, target: u32) -> Result<(), OutputError> {
+        let Window {
+            x,
+            y,
+            width,
+            height,
+        } = self.window;
+        let header = Header {
+            identity: identity.clone(),
+            target,
+            resolution: self.resolution,
+            window: [x, y, width, height],
+            aovs: self.aovs.iter().collect(),
+            share: [self.share.start, self.share.end],
+        };
+        let header = serde_json::to_vec(&header).expect("strings and numbers alone");
+        let mut bytes = Vec::with_capacity(self.bytes() + header.len() + 4096);
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
+        bytes.extend_from_slice(&header);
+        for tile in &self.tiles {
+            write_tile(tile, &mut bytes);
+        }
+        bytes.extend_from_slice(&xxh3_128(&bytes).to_le_bytes());
+        replace(path, &bytes)
+    }
+
+    /// Goes on with a saved film, which must be of the same layout and identity.
+    ///
+    /// # Errors
+    /// When it is not, or has gaps between its samples. This film is then unchanged.
+    pub fn resume(&mut self, saved: SavedFilm, identity: &Identity) -> Result<(), FilmError> {
+        let SavedFilm { path, header, film } = saved;
+        let other = |difference| Err(FilmError::OtherRender { path, difference });
+        if let Some(difference) = difference(&header.identity, identity) {
+            return other(difference);
+        }
+        if film.resolution != self.resolution || film.window != self.window {
+            return other("it has another resolution or crop".to_owned());
+        }
+        if film.aovs != self.aovs {
+            return other("it has other AOVs".to_owned());
+        }
+        let begins = |tile: &FilmTile| match tile.taken.ranges() {
+            [] => true,
+            [range] => range.start == self.share.start,
+            _ => false,
+        };
+        if !film.tiles.iter().all(begins) {
+            let (theirs, ours) = (film.common(), self.share.start);
+            return other(format!(
+                "it has samples {theirs}, which can't be gone on with from sample {ours}"
+            ));
+        }
+        let share = self.share.clone();
+        *self = film;
+        self.share = share;
+        Ok(())
+    }
+}
+
+impl SavedFilm {
+    /// Reads a film.
+    ///
+    /// # Errors
+    /// When the file is no film, is damaged, or says what no film can.
+    pub fn read(path: &Path) -> Result<Self, FilmError> {
+        let io = |source| FilmError::Io {
+            path: path.to_owned(),
+            source,
+        };
+        let format = |reason: &str| FilmError::Format {
+            path: path.to_owned(),
+            reason: reason.to_owned(),
+        };
+        // A pipe or a device may never end.
+        if !std::fs::metadata(path).map_err(io)?.is_file() {
+            return Err(format("it is no regular file"));
+        }
+        let bytes = std::fs::read(path).map_err(io)?;
+        let Some(content) = bytes.strip_prefix(MAGIC) else {
+            let same = bytes.starts_with(&MAGIC[..15]);
+            return Err(format(match same {
+                true => "it is of another version",
+                false => "it begins differently",
+            }));
+        };
+        let damaged = || format("it is cut off or damaged");
+        let (content, sum) = content.split_last_chunk::<16>().ok_or_else(damaged)?;
+        if u128::from_le_bytes(*sum) != xxh3_128(&bytes[..bytes.len() - 16]) {
+            return Err(damaged());
+        }
+        let (header, film) =
+            read(content).ok_or_else(|| format("its content contradicts itself"))?;
+        Ok(Self {
+            path: path.to_owned(),
+            header,
+            film,
+        })
+    }
+}
+
+fn write_tile(tile: &FilmTile, bytes: &mut Vec<u8>) {
+    let ranges = tile.taken.ranges();
+    bytes.extend_from_slice(&(ranges.len() as u32).to_le_bytes());
+    for value in ranges.iter().flat_map(|range| [range.start, range.end]) {
+        bytes.extend_from_slice(&value.to_le_bytes());
+    }
+    tile.sums.write(bytes);
+    for value in tile.halves.as_flattened().as_flattened() {
+        bytes.extend_from_slice(&value.to_le_bytes());
+    }
+    for value in tile.left_out.iter().chain(&tile.aovs_left_out) {
+        bytes.extend_from_slice(&value.to_le_bytes());
+    }
+    for fault in &tile.faults {
+        bytes.extend_from_slice(&fault.samples.to_le_bytes());
+        bytes.extend_from_slice(&(fault.pixels.len() as u32).to_le_bytes());
+        for value in fault.pixels.as_flattened() {
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+}
+
+/// All between the magic bytes and the hash; `None` when it can't be a film's.
+fn read(content: &[u8]) -> Option<(Header, Film)> {
+    let mut reader = Reader(content);
+    let length = reader.u32()? as usize;
+    if length > LONGEST_HEADER {
+        return None;
+    }
+    let (header, rest) = reader.0.split_at_checked(length)?;
+    reader.0 = rest;
+    let header: Header = serde_json::from_slice(header).ok()?;
+    let [x, y, width, height] = header.window;
+    let window = Window {
+        x,
+        y,
+        width,
+        height,
+    };
+    let [columns, rows] = header.resolution;
+    let fits = |start: u32, size: u32, full| start.checked_add(size).is_some_and(|end| end <= full);
+    // Each pixel takes more than a hundred bytes: what is too large is not allocated.
+    let area = u64::from(width) * u64::from(height);
+    let [first, end] = header.share;
+    if !fits(x, width, columns) || !fits(y, height, rows) || area > rest.len() as u64 || first > end
+    {
+        return None;
+    }
+    let aovs: AovSet = header.aovs.iter().copied().collect();
+    let mut film = Film::new(header.resolution, window, aovs);
+    film.set_share(first..end);
+    for tile in &mut film.tiles {
+        reader.tile(tile)?;
+    }
+    reader.0.is_empty().then_some((header, film))
+}
+
+/// The part of a saved film that is yet to be read.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk::<N>()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    fn tile(&mut self, tile: &mut FilmTile) -> Option<()> {
+        let ranges = self.u32()? as usize;
+        if ranges > self.0.len() / 8 {
+            return None;
+        }
+        let range =
+            |reader: &mut Self| -> Option<Range<u32>> { Some(reader.u32()?..reader.u32()?) };
+        let ranges: Option<Vec<_>> = (0..ranges).map(|_| range(self)).collect();
+        tile.taken = Taken::new(ranges?)?;
+        tile.sums = ExactSums::read(&mut self.0, tile.sums.len())?;
+        for value in tile.halves.as_flattened_mut().as_flattened_mut() {
+            *value = f32::from_le_bytes(self.take()?);
+        }
+        for value in tile.left_out.iter_mut().chain(&mut tile.aovs_left_out) {
+            *value = self.u32()?;
+        }
+        for fault in &mut tile.faults {
+            fault.samples = u64::from_le_bytes(self.take()?);
+            let pixels = self.u32()? as usize;
+            if pixels > FAULT_PIXELS {
+                return None;
+            }
+            for _ in 0..pixels {
+                fault.pixels.push([self.u32()?, self.u32()?]);
+            }
+        }
+        tile.is_possible().then_some(())
+    }
+}

@@ -1,0 +1,158 @@
+//! What decides about a render's samples: canonical values of the description, the
+//! contents of the files that it names, the program and the processor.
+
+use std::path::PathBuf;
+
+use xxhash_rust::xxh3::{Xxh3, xxh3_128};
+
+use super::load::Assets;
+use crate::description::{Description, Film, Object, Sampling, Texture, World};
+use crate::film::Identity;
+use crate::mesh::Mesh as Triangles;
+
+/// Names what decides about the samples of a render, each with a hash or a short value.
+/// Where files lie, what objects are called, the number of samples and the exposure of
+/// PNGs do not take part; what does by its name (meshes, materials, textures) is taken
+/// as referred to.
+///
+/// XXH3 is fast enough for gigabytes of textures, its results are specified to stay,
+/// and nobody gains by a collision.
+pub(super) fn identity(description: &Description, assets: &Assets) -> Identity {
+    let Description {
+        version: _,
+        light_units,
+        camera,
+        film,
+        sampling,
+        world,
+        textures,
+        materials,
+        meshes: _,
+        objects,
+        lights,
+        directory: _,
+    } = description;
+    let Film {
+        width,
+        height,
+        filter,
+        exposure: _,
+        aovs: _,
+    } = film;
+    let Sampling {
+        spp: _,
+        seed,
+        max_bounces,
+        roulette_start,
+        branches,
+        estimator,
+    } = sampling;
+    let mut identity = Identity::new();
+    let mut add = |name: String, value: String| {
+        identity.insert(name, value);
+    };
+    add("program".into(), env!("CARGO_PKG_VERSION").into());
+    add("processor".into(), processor().into());
+    add("camera".into(), of_value(camera));
+    add("resolution".into(), format!("{width} × {height}"));
+    add("filter".into(), of_value(filter));
+    add("seed".into(), seed.to_string());
+    add("max_bounces".into(), max_bounces.to_string());
+    add("roulette_start".into(), roulette_start.to_string());
+    add("branches".into(), format!("{branches:?}"));
+    add("estimator".into(), format!("{estimator:?}"));
+    add("light_units".into(), format!("{light_units:?}"));
+    let mut surroundings = world.clone();
+    if let Some(World::Environment { file, .. }) = &mut surroundings {
+        *file = PathBuf::new();
+    }
+    let image = assets.environment.as_ref();
+    let image = image.map(|image| (image.width, of_floats(image.pixels.as_flattened())));
+    add("world".into(), of_value(&(surroundings, image)));
+    for (index, light) in lights.iter().enumerate() {
+        add(format!("light {index}"), of_value(light));
+    }
+    for (name, material) in materials {
+        add(format!("material `{name}`"), of_value(material));
+    }
+    for (index, object) in objects.iter().enumerate() {
+        let object = Object {
+            name: None,
+            ..object.clone()
+        };
+        add(format!("object {index}"), of_value(&object));
+    }
+    for (name, mesh) in &assets.meshes {
+        let value = of_value(&of_mesh(mesh));
+        add(format!("mesh `{name}`"), value);
+    }
+    for name in assets.textures.keys() {
+        let Some(texture) = textures.get(name) else {
+            continue;
+        };
+        let content = std::fs::read(description.resolve_path(&texture.file));
+        let described = Texture {
+            file: PathBuf::new(),
+            ..texture.clone()
+        };
+        let content = content.ok().map(|bytes| xxh3_128(&bytes));
+        add(format!("texture `{name}`"), of_value(&(described, content)));
+    }
+    identity
+}
+
+/// Of all fields; floats are written so that they come back with the same bits.
+fn of_value(value: &impl std::fmt::Debug) -> String {
+    format!("{:032x}", xxh3_128(format!("{value:?}").as_bytes()))
+}
+
+fn of_floats(values: &[f32]) -> u128 {
+    let mut hasher = Xxh3::new();
+    for chunk in values.chunks(1024) {
+        let bytes: Vec<u8> = chunk.iter().flat_map(|value| value.to_le_bytes()).collect();
+        hasher.update(&bytes);
+    }
+    hasher.digest128()
+}
+
+fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
+    let Triangles {
+        positions,
+        triangles,
+        normals,
+        uvs,
+        material_of_triangle,
+        material_names,
+    } = mesh;
+    let mut indices = Xxh3::new();
+    for index in triangles.as_flattened() {
+        indices.update(&index.to_le_bytes());
+    }
+    let slots = material_of_triangle.as_ref().map(|slots| {
+        let bytes: Vec<u8> = slots.iter().flat_map(|slot| slot.to_le_bytes()).collect();
+        xxh3_128(&bytes)
+    });
+    (
+        of_floats(positions.as_flattened()),
+        indices.digest128(),
+        normals.as_ref().map(|n| of_floats(n.as_flattened())),
+        uvs.as_ref().map(|uvs| of_floats(uvs.as_flattened())),
+        slots,
+        material_names.clone(),
+    )
+}
+
+/// The instructions that Embree chooses its code by, which differ in their last bits.
+fn processor() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+            return "AVX-512";
+        } else if is_x86_feature_detected!("avx2") {
+            return "AVX2";
+        } else if is_x86_feature_detected!("avx") {
+            return "AVX";
+        }
+    }
+    std::env::consts::ARCH
+}
