@@ -84,6 +84,8 @@ def binary():
     for path in (bpy.path.abspath(chosen) if chosen else "", os.environ.get("SMITHWALK", ""), own,
                  shutil.which("smithwalk") or ""):
         if path and os.path.isfile(path):
+            if not os.access(path, os.X_OK):  # extensions are unpacked without the bit
+                os.chmod(path, 0o755)
             return path
     raise ExportError("the smithwalk program was not found: name it in the add-on's preferences")
 
