@@ -17,7 +17,6 @@ from .bake import Baker
 from .files import Folder
 from .images import ImageWriter
 from .log import Log
-from .lower import lower
 from .materials import MaterialWriter, asks_for_uv_maps
 from .meshes import MeshWriter
 from .world import WorldWriter
@@ -230,9 +229,6 @@ class Job:
             log.note("scene", "has no surfaces")
         world, suns = self.world.section(images)
         lamps += suns
-        for name, material in self.materials.materials.items():
-            self.materials.materials[name] = lower(
-                material, lambda what, name=name: log.warn(f'material "{name}"', what))
         render = scene.render
         border, render.use_border = render.use_border, self.border
         try:
@@ -380,17 +376,15 @@ class Job:
                 self.log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
 
     def _check_tangents(self, ob, names, where):
-        """Blender's radial tangents turn about the middle of the bounding box, in coordinates
-        scaled by it; the renderer's turn about an axis through the middle, unscaled."""
+        """Blender's radial tangents turn in coordinates that the bounding box scales, the
+        renderer's in unscaled ones."""
         corners = [tuple(c) for c in ob.bound_box]
         extent = [max(c[i] for c in corners) - min(c[i] for c in corners) for i in range(3)]
-        middle = [max(c[i] for c in corners) + min(c[i] for c in corners) for i in range(3)]
         size = max(extent)
         for axis in sorted(set().union(*(self.materials.radial_axes[n] for n in names))):
             i, j = (k for k in range(3) if k != "xyz".index(axis))
-            if abs(extent[i] - extent[j]) > 1e-3 * size or max(abs(middle[i]), abs(middle[j])) > 1e-3 * size:
-                self.log.warn(where, f"its radial tangent turns about the object's {axis} axis, "
-                                     "Blender's about the bounding box")
+            if abs(extent[i] - extent[j]) > 1e-3 * size:
+                self.log.warn(where, f"its radial tangent about {axis} ignores that the bounding box is uneven")
 
 
 class _NoCamera:
