@@ -288,7 +288,7 @@ fn many_lights_add_up() {
     let quad_at = Vec3::new(-2.0, 1.0, 2.0);
     let one_sided = lambert(&corners(rectangle_at, [1.0; 2], Vec3::ZERO), DVec3::Z);
     let triangles = lambert(&corners(quad_at, [1.0; 2], Vec3::ZERO), DVec3::Z);
-    // As few as are compared at every point, and so many that a table decides.
+    // As few as are compared at every point, and so many that a tree decides.
     for points in [3, 100] {
         let mut shapes = vec![sun, rectangle];
         let mut expected = sun_irradiance + one_sided + 3.0 * triangles;

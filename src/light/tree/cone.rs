@@ -82,3 +82,49 @@ impl Cone {
             + FRAC_PI_2 * (2.0 * w * sin - (o - 2.0 * w).cos() - 2.0 * o * sin + cos)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The union's normals hold those of both, for axes all round; 1e-3 rad is
+    /// what rounding and the approximate arc cosine may add.
+    #[test]
+    fn a_union_holds_both() {
+        let axes: Vec<Vec3> = (0..60)
+            .map(|i| {
+                let (sin, cos) = (i as f32 * 2.4).sin_cos();
+                let z = 1.0 - (i as f32 + 0.5) / 30.0;
+                Vec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z
+            })
+            .collect();
+        for (i, &a) in axes.iter().enumerate() {
+            for (j, &b) in axes.iter().enumerate() {
+                let a = Cone {
+                    normals: i as f32 * 0.04,
+                    ..Cone::around(a, 0.3)
+                };
+                let b = Cone {
+                    normals: j as f32 * 0.01,
+                    ..Cone::around(b, 1.0)
+                };
+                let both = a.union(b);
+                assert_eq!(both.reach, 1.0);
+                for cone in [a, b] {
+                    let farthest = both.axis.dot(cone.axis).clamp(-1.0, 1.0).acos() + cone.normals;
+                    assert!(
+                        farthest.min(PI) <= both.normals + 1e-3,
+                        "{cone:?} in {both:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_measure_of_all_directions_and_of_one_side() {
+        // 4π, and ∫ cos over a hemisphere.
+        assert!((Cone::ALL.measure() - 4.0 * PI).abs() < 1e-5);
+        assert!((Cone::around(Vec3::Z, FRAC_PI_2).measure() - PI).abs() < 1e-5);
+    }
+}
