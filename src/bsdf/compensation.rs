@@ -28,8 +28,8 @@ use rayon::prelude::*;
 use super::table::with_ndf;
 use super::{Distribution, Width};
 use smithwalk_model::{
-    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Facets, Ggx, Glass,
-    Microsurface, Ndf, Refraction, Rgb, Vector3,
+    Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Facets, Glass, Microsurface, Ndf,
+    Refraction, Rgb, Vector3,
 };
 
 /// Cosines of a table; odd, for Simpson's rule.
@@ -337,6 +337,7 @@ mod tests {
     use crate::bsdf::{Method, Rough};
     use glam::Vec3;
     use rand::SeedableRng;
+    use smithwalk_model::{Beckmann, Ggx};
 
     const WHITE: Rgb<f32> = Rgb([1.0; 3]);
 

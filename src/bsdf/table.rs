@@ -127,7 +127,7 @@ macro_rules! distributions {
             ($distribution:expr, $name:ident => $body:expr) => {
                 match $distribution {
                     $(Distribution::$ndf => {
-                        type $name = $ndf<f32>;
+                        type $name = ::smithwalk_model::$ndf<f32>;
                         $body
                     })*
                 }

@@ -84,7 +84,7 @@ pub use facets::{
 };
 pub use fresnel::ConductorFresnel;
 pub use lanes::{BeckmannLanes, Directions, GgxLanes, LANES, NdfInLanes, NdfLanes};
-pub use ndf::{Beckmann, Ggx, Ndf, Quadratic};
+pub use ndf::*;
 pub use real::{Real, ln_beta};
 pub use tally::{PerOrder, Split, Tally, Total};
 pub use vector::{Rgb, Vector3};
