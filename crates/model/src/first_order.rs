@@ -81,7 +81,7 @@ where
     /// (1 + Λ_i)/(1 + Λ_i + Λ_o). Transmission, where the depth is that of the
     /// other side (Heitz et al. 2016, § 5.2): (1 + Λ_i) B(1 + Λ_i, 1 + Λ_o).
     #[inline]
-    fn escape(&self, at: At<F>, wo: Vector3<F>) -> F {
+    pub(super) fn escape(&self, at: At<F>, wo: Vector3<F>) -> F {
         let cos_i = at.w.z;
         if wo.z > F::zero() {
             return escape_reflected(at, wo.z, self.ndf.projected_area(-wo));

@@ -58,6 +58,7 @@ mod first_order;
 pub mod fresnel;
 pub mod heights;
 mod lanes;
+pub mod layered;
 mod ndf;
 mod position_free;
 mod proxy;

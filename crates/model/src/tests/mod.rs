@@ -3,6 +3,7 @@
 
 mod estimators;
 mod lanes;
+mod layered;
 mod normals;
 
 use super::*;
