@@ -9,7 +9,8 @@
 //! A [`Microsurface`] is a distribution of normals ([`Ggx`], [`Beckmann`],
 //! [`Quadratic`], or any other [`Ndf`]) and what its facets do ([`Conductor`],
 //! [`Dielectric`], [`Diffuse`], or any other [`Facets`]), in `f32` or `f64`.
-//! It knows nothing of a renderer.
+//! It knows nothing of a renderer. Several such surfaces over one another are
+//! a stack ([`layered`]).
 //!
 //! # Conventions
 //! - Local frame, z = the macroscopic normal. ω_i and ω_o are unit vectors

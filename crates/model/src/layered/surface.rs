@@ -1,5 +1,6 @@
 //! One surface of a stack.
 
+use crate::fresnel;
 use crate::walk::Ray;
 use crate::{Beckmann, Bounce, Conductor, Dielectric, Diffuse, Draw, Exit, Facets, Ggx};
 use crate::{Microsurface, Real, Rgb, Side, Vector3};
@@ -88,6 +89,21 @@ pub(super) fn bounce_smooth<F: Real, I: Facets<Scalar = F>>(
     Bounce {
         direction: localized(side, bounce.direction),
         ..bounce
+    }
+}
+
+impl<F: Real> Dielectric<F> {
+    /// The share of light from `w` that a smooth interface lets through, and
+    /// its direction; both directions in the frame of `side`. `None` under
+    /// total reflection.
+    pub(super) fn let_through(self, side: Side, w: Vector3<F>) -> Option<(F, Vector3<F>)> {
+        let eta = match side {
+            Side::Above => self.eta,
+            Side::Below => self.eta.recip(),
+        };
+        let (reflectance, cos_t) = fresnel::dielectric(w.z, eta);
+        let direction = Vector3::new(-w.x / eta, -w.y / eta, -cos_t).normalized();
+        (reflectance < F::one() && cos_t > F::zero()).then_some((F::one() - reflectance, direction))
     }
 }
 

@@ -183,6 +183,12 @@ impl<F: Real> Surface<F> {
             resistance: F::zero(),
         };
         each_rough!(self, rough => rough.wander(number, squares, trail, rng),
+            Surface::Interface(facets) if trail.arrivals.len() == 1 => {
+                // What it reflects here leaves, and adds nothing: all goes through.
+                let side = side_of(arrival.w);
+                let (share, direction) = facets.let_through(side, localized(side, arrival.w))?;
+                Some(smooth(localized(side, direction), Rgb::splat(share)))
+            }
             Surface::Interface(facets) => {
                 let bounce = bounce_smooth(facets, arrival.w, rng);
                 Some(smooth(bounce.direction, bounce.weight))

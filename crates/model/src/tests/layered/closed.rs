@@ -30,6 +30,14 @@ fn mean_reflectances_of_water_and_glass() {
     assert!((mean_internal(1.5) - 0.5963).abs() < 1e-4);
 }
 
+/// What leaves a smooth interface over Lambert:
+/// F + (1 − F)(1 − F̄_i) ρ/(1 − ρ F̄_i).
+fn coated_albedo(eta: f64, rho: f64, cos: f64) -> f64 {
+    let f = fresnel::dielectric(cos, eta).0;
+    let inside = mean_internal(eta);
+    f + (1.0 - f) * (1.0 - inside) * rho / (1.0 - rho * inside)
+}
+
 #[test]
 fn a_smooth_coat_over_lambert_meets_the_closed_form() {
     let cases = [(1.5, 0.8), (1.2, 0.5), (2.5, 0.95), (1.5, 1.0), (1.05, 0.7)];
@@ -39,9 +47,7 @@ fn a_smooth_coat_over_lambert_meets_the_closed_form() {
         let stack = stack(&[(eta, 0.0)], lambert(rho));
         for cos in [0.95, 0.5, 0.1] {
             let wi = Vector3::spherical(cos, 0.3);
-            let f = fresnel::dielectric(cos, eta).0;
-            let inside = mean_internal(eta);
-            let expected = f + (1.0 - f) * (1.0 - inside) * rho / (1.0 - rho * inside);
+            let expected = coated_albedo(eta, rho, cos);
             let mean = albedo(&stack, wi, 60_000, &mut rng);
             assert!(
                 mean.score(expected).abs() < bound,
@@ -59,6 +65,69 @@ fn a_smooth_coat_over_lambert_meets_the_closed_form() {
                     mean.mean,
                     mean.error()
                 );
+            }
+        }
+    }
+}
+
+/// The same to a standard error of 1e-4 in the albedo, sampled and integrated
+/// from evaluation, and of 2e-4 in relative terms in f: `cargo test --release -p
+/// smithwalk-model to_four_digits -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes minutes"]
+fn a_smooth_coat_over_lambert_meets_the_closed_form_to_four_digits() {
+    let cases = [(1.5, 0.8), (1.5, 0.2), (1.3, 0.5)];
+    let bound = worst_score(cases.len() * 2 * 4);
+    let mut rng = stream(42);
+    let mut check = |what: &str, mean: Mean, expected: f64| {
+        let score = mean.score(expected);
+        let error = mean.error();
+        println!(
+            "{what}: {:.6} ± {error:.6}, exact {expected:.6} ({score:+.2})",
+            mean.mean
+        );
+        assert!(score.abs() < bound, "{what}");
+    };
+    for (eta, rho) in cases {
+        let stack = stack(&[(eta, 0.0)], lambert(rho));
+        for cos in [0.9, 0.3] {
+            let what = format!("n {eta}, ρ {rho}, cos {cos}");
+            let wi = Vector3::spherical(cos, 0.3);
+            let expected = coated_albedo(eta, rho, cos);
+            let mut sampled = Mean::default();
+            let mut integrated = Mean::default();
+            while sampled.count < 1e4 || sampled.error().max(integrated.error()) > 1e-4 {
+                for _ in 0..10_000 {
+                    let exit = stack.sample(wi, &mut rng);
+                    sampled.add(exit.map_or(0.0, |exit| exit.weight.0[0]));
+                    let wo = Vector3::spherical(
+                        uniform(&mut rng).sqrt(),
+                        std::f64::consts::TAU * uniform(&mut rng),
+                    );
+                    let mut total = Total::default();
+                    stack.eval(wi, wo, &mut rng, &mut total);
+                    integrated.add(total.0.0[0] * std::f64::consts::PI / wo.z);
+                }
+            }
+            check(&format!("{what}, sampled"), sampled, expected);
+            let mirrored = fresnel::dielectric(cos, eta).0;
+            check(
+                &format!("{what}, integrated"),
+                integrated,
+                expected - mirrored,
+            );
+            for out in [0.7, 0.1] {
+                let wo = Vector3::spherical(out, 2.0);
+                let expected = coated_lambert(eta, rho, wi, wo);
+                let mut mean = Mean::default();
+                while mean.count < 1e4 || mean.error() > 2e-4 * expected {
+                    for _ in 0..10_000 {
+                        let mut total = Total::default();
+                        stack.eval(wi, wo, &mut rng, &mut total);
+                        mean.add(total.0.0[0]);
+                    }
+                }
+                check(&format!("{what} to {out}"), mean, expected);
             }
         }
     }

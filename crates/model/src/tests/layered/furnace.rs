@@ -33,10 +33,10 @@ fn shares(
 fn white() -> Vec<(String, Layered<f64>)> {
     let mut stacks = Vec::new();
     let bases = [
-        ("mirror", metal(0.0, 1.0)),
-        ("metal α 0.3", metal(0.3, 1.0)),
         ("Lambert", lambert(1.0)),
         ("diffuse facets α 0.5", matte(0.5, 1.0)),
+        ("metal α 0.3", metal(0.3, 1.0)),
+        ("mirror", metal(0.0, 1.0)),
     ];
     for (base_name, base) in &bases {
         for alpha in [0.0, 0.05, 0.2, 0.5, 1.0] {
