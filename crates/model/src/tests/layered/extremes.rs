@@ -186,17 +186,16 @@ fn slabs_absorb_along_the_slanted_way() {
     for _ in 0..50_000 {
         let exit = stack.sample(Vector3::spherical(cos, 1.0), &mut rng);
         let weight = exit.map_or(Rgb::black(), |exit| exit.weight);
-        for c in 0..3 {
-            means[c].add(weight.0[c]);
+        for (mean, weight) in means.iter_mut().zip(weight.0) {
+            mean.add(weight);
         }
     }
-    for c in 0..3 {
-        let score = means[c].score(expected.0[c]);
+    for (mean, expected) in means.iter().zip(expected.0) {
+        let score = mean.score(expected);
         assert!(
             score.abs() < worst_score(3),
-            "{c}: {} {:?}",
-            means[c].mean,
-            expected
+            "{} against {expected}",
+            mean.mean
         );
     }
 }

@@ -9,6 +9,11 @@ use super::*;
 use crate::layered::proxy::Shape;
 use crate::layered::*;
 
+/// A number in [0, 1).
+fn uniform(rng: &mut Stream<Pcg64Mcg>) -> f64 {
+    rng.draw()
+}
+
 /// A finish of roughness α, by GGX; none at 0.
 fn finish(alpha: f64) -> Finish<f64> {
     if alpha > 0.0 {
