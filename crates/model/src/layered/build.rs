@@ -284,6 +284,11 @@ fn under<F: Real>(
             reflectance(f0)?;
             reflectance(f82)?;
         }
+        ConductorFresnel::Dielectric { eta, f0, f90 } => {
+            check(None, Quantity::Ior, eta, eta > F::zero())?;
+            reflectance(f0)?;
+            reflectance(f90)?;
+        }
         ConductorFresnel::Complex { eta, k } => {
             for c in 0..3 {
                 let (eta, k) = (eta.0[c], k.0[c]);
