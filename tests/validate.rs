@@ -18,7 +18,7 @@ fn the_model_holds_and_the_report_says_so() {
     assert_eq!(printed["passed"], true);
     let statements = printed["report"]["statements"].as_array().unwrap();
     let numbers: Vec<_> = statements.iter().map(|s| s["number"].as_u64()).collect();
-    assert_eq!(numbers, (1..=12).map(Some).collect::<Vec<_>>());
+    assert_eq!(numbers, (1..=13).map(Some).collect::<Vec<_>>());
     for statement in statements {
         for check in statement["checks"].as_array().unwrap() {
             assert!(check["cases"].as_u64() > Some(0), "{check}");

@@ -199,10 +199,12 @@ where
                 }
             }
             order += 1;
-            // Connect to the far end. Seen by a ray that goes up steeply are only steep
-            // facets, and D/σ is finite for these. An overflow comes from the half vector
-            // of two directions that differ by rounding alone, which is no facet's normal.
+            // Connect to the far end.
+            if is_unseen(d, to.w) {
+                continue;
+            }
             let phase = self.facets.phase(ndf, at, to.w, false, m);
+            // Facets unevenly rough may leave an overflow still.
             if phase.density > F::zero() && phase.density.is_finite() {
                 // σ(w) p is D(h)/4 without Fresnel.
                 let other = ratio * (F::of(4.0) * at.sigma * phase.density / to.sigma);
@@ -211,6 +213,20 @@ where
             }
         }
     }
+}
+
+/// How much less steep than it must be a normal is before it is taken for rounding.
+pub(super) const SLACK: f64 = 1.25;
+
+/// Whether the half vector of −`d` and `wo` is rounding alone. A ray that goes up sees
+/// facets that are steeper than it. Where `d` and `wo` are so near that their difference
+/// has no digits, it is none of them, and D may be anything beside a σ(−d) of nearly 0.
+#[inline]
+fn is_unseen<F: Real>(d: Vector3<F>, wo: Vector3<F>) -> bool {
+    let h = wo - d;
+    let rise = h.z * d.z;
+    let across = (h.x * h.x + h.y * h.y) * (d.x * d.x + d.y * d.y);
+    d.z > F::zero() && rise * rise > F::of(SLACK * SLACK) * across
 }
 
 /// Ratios of densities that are as good as 0 and ∞.

@@ -7,7 +7,7 @@ use super::math::{Directions, phase, reflectance};
 use super::ndf::{NdfInLanes, NdfLanes};
 use super::rotated::Rotated;
 use super::{LANES, survivors};
-use crate::position_free::{COMMON, NEVER, RATIOS};
+use crate::position_free::{COMMON, NEVER, RATIOS, SLACK};
 use crate::walk::Roulette;
 use crate::{Conductor, ConductorFresnel, Draw, Microsurface, Rgb, Split, Tally, Vector3};
 
@@ -250,10 +250,10 @@ impl<N: NdfLanes, T: FnMut(u32, [f32x8; 3])> Walks<'_, N, T> {
                 }
             }
             order += 1;
-            // Connect to the far end, but, as the scalar estimator, not by half vectors
-            // that are rounding alone.
+            // Connect to the far end.
             let (density, length) = phase(&self.ndf, w, sigma, to.w);
-            let density = density.is_finite().blend(density, zero);
+            let none = unseen(d, to.w) | !density.is_finite();
+            let density = none.blend(zero, density);
             let tint = reflectance(self.fresnel, f32x8::HALF * length);
             let other = ratio * (f32x8::from(4.0) * sigma * density / to.sigma);
             let value = density * self.depth.escape(lambda) / (one + other);
@@ -261,6 +261,16 @@ impl<N: NdfLanes, T: FnMut(u32, [f32x8; 3])> Walks<'_, N, T> {
             (self.add)(order, seen);
         }
     }
+}
+
+/// Whether a half vector is rounding alone, as for the scalar estimator.
+#[inline]
+fn unseen(d: Directions, wo: Directions) -> f32x8 {
+    let h = wo.plus(d.reversed());
+    let rise = h.z * d.z;
+    let across = (h.x * h.x + h.y * h.y) * (d.x * d.x + d.y * d.y);
+    let slack = f32x8::from((SLACK * SLACK) as f32);
+    d.z.cmp_gt(f32x8::ZERO) & (rise * rise).cmp_gt(slack * across)
 }
 
 /// Keeps a product of many factors away from 0 and ∞, as the scalar estimator does.
