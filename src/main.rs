@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         // A closed pipe (`| head`) is no failure of ours.
         Err(error) if cli::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", cli::told(&error));
             ExitCode::from(2)
         }
     }

@@ -78,6 +78,19 @@ impl Budget {
     }
 }
 
+/// The bytes that this process holds now, and the most it has held; none where the
+/// system does not tell.
+#[must_use]
+pub fn resident() -> Option<[u64; 2]> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let bytes = |name: &str| {
+        let line = status.lines().find(|line| line.starts_with(name))?;
+        let kib = line.split_ascii_whitespace().nth(1)?.parse::<u64>().ok()?;
+        Some(kib * 1024)
+    };
+    Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
+}
+
 /// What the system, and the group of processes that this one belongs to, can
 /// give, in bytes.
 fn available() -> Option<u64> {

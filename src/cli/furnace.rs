@@ -44,6 +44,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         let source = SceneArgs {
             scene: path.clone(),
             overrides: args.overrides.clone(),
+            memory: None,
         };
         return scene(args, &source, out, log);
     }

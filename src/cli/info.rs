@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use serde_json::json;
 use smithwalk::features::Features;
 use smithwalk::integrator::{KERNELS, kernel_for};
-use smithwalk::scene::Scene;
+use smithwalk::memory::{Bytes, resident};
+use smithwalk::scene::{RenderSettings, Scene};
 
 use super::scene::SceneArgs;
 
@@ -24,6 +25,8 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let start = std::time::Instant::now();
     let scene = args.scene.resolve(&description, log)?.scene;
     let seconds = start.elapsed().as_secs_f64();
+    let film_bytes = RenderSettings::new(&description).memory();
+    let needed = needed(film_bytes);
     let kernel = KERNELS[kernel_for(scene.features)];
     if args.json {
         let features: Vec<_> = Features::ALL
@@ -45,7 +48,8 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
             "materials": scene.materials.len(),
             "textures": scene.textures.len(),
             "lights": scene.lights.lamps().len(),
-            "bytes": bytes(&scene).map(|(name, bytes)| json!({"what": name, "bytes": bytes})),
+            "bytes": bytes(&scene, film_bytes).map(|(name, bytes)| json!({"what": name, "bytes": bytes})),
+            "memory": needed,
             "start_up_seconds": seconds,
             "features": features,
         });
@@ -68,8 +72,11 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         "{} × {} pixels, {} spp, {} bounces; read and built in {seconds:.3} s",
         film.width, film.height, description.sampling.spp, description.sampling.max_bounces
     )?;
-    for (what, bytes) in bytes(&scene) {
+    for (what, bytes) in bytes(&scene, film_bytes) {
         writeln!(out, "  {what:<24} {:>10.1} kB", bytes as f64 / 1e3)?;
+    }
+    if let Some(needed) = needed {
+        writeln!(out, "a render takes {} of memory", Bytes(needed))?;
     }
     writeln!(out, "in use:")?;
     for (feature, name, cost) in Features::ALL {
@@ -92,8 +99,17 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     Ok(ExitCode::SUCCESS)
 }
 
-/// What takes memory, Embree's own structures aside.
-fn bytes(scene: &Scene) -> [(&'static str, usize); 5] {
+/// The most that a render holds at once: what this process did, or what it holds
+/// now and the film.
+fn needed(film: u64) -> Option<u64> {
+    /// Threads, kernels and encoders of a render, measured on two cores.
+    const RENDER: u64 = 2_500_000;
+    let [now, most] = resident()?;
+    Some(most.max(now + film + RENDER))
+}
+
+/// What takes memory; the program itself and what it holds of the scene file aside.
+fn bytes(scene: &Scene, film: u64) -> [(&'static str, usize); 7] {
     let meshes = &scene.meshes;
     let sum = |size: fn(&smithwalk::scene::SceneMesh) -> usize| meshes.iter().map(size).sum();
     [
@@ -114,5 +130,7 @@ fn bytes(scene: &Scene) -> [(&'static str, usize); 5] {
             smithwalk::texture::Texture::memory(&scene.textures),
         ),
         ("lights", scene.lights.bytes()),
+        ("Embree", scene.accelerator.memory() as usize),
+        ("film", film as usize),
     ]
 }

@@ -15,6 +15,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use smithwalk::text::bounded;
 
 /// Renders Blender scenes with multiple-scattering microfacet materials, and
 /// measures those materials.
@@ -63,6 +64,22 @@ impl Cli {
             Command::Bsdf(command) => bsdf::run(command, out, log),
         }
     }
+}
+
+/// In bytes: room for all that is wrong with a scene.
+const MAX_ERROR: usize = 1 << 16;
+
+/// An error and its causes, each once: many errors name theirs already.
+pub fn told(error: &anyhow::Error) -> String {
+    let mut said = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if said.is_empty() {
+            said = cause;
+        } else if !said.contains(&cause) {
+            said = format!("{said}: {cause}");
+        }
+    }
+    bounded(&said, MAX_ERROR)
 }
 
 /// Whether the error is the reader of our output having gone away.

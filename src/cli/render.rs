@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     /// Threads; the image does not depend on it [default: all cores]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Render these pixels alone: left, top, right and bottom edge
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_crop)]
@@ -190,7 +190,11 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         settings,
         identity,
         ..
-    } = args.scene.resolve(&description, log)?;
+    } = {
+        let settings = override_settings(args, RenderSettings::new(&description))?;
+        args.scene
+            .resolve_beside(&description, settings.memory(), log)?
+    };
     let settings = override_settings(args, settings)?;
     let mut film = settings.film();
     if args.resume && outputs.film.exists() {

@@ -5,7 +5,12 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use smithwalk::description::Description;
-use smithwalk::scene::{Resolved, resolve};
+use smithwalk::memory::Budget;
+use smithwalk::scene::{RenderSettings, Resolved, resolve_within};
+use smithwalk::text::bounded;
+
+/// In bytes; longer warnings are cut.
+const MAX_WARNING: usize = 2000;
 
 /// A scene file and changes to it.
 #[derive(clap::Args)]
@@ -15,6 +20,17 @@ pub struct SceneArgs {
     /// Change a value of the scene file, e.g. -D materials.gold.conductor.roughness=0.3
     #[arg(short = 'D', value_name = "PATH=VALUE", value_parser = parse_override)]
     pub overrides: Vec<(String, String)>,
+    /// Refuse what takes more memory, e.g. 8e9 [default: what the machine has]
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub memory: Option<u64>,
+}
+
+fn parse_bytes(text: &str) -> Result<u64, String> {
+    let number = text.parse::<f64>().ok();
+    number
+        .filter(|bytes| (1.0..1e18).contains(bytes))
+        .map(|bytes| bytes as u64)
+        .ok_or_else(|| "expected a number of bytes, e.g. 8e9".to_owned())
 }
 
 pub fn parse_override(text: &str) -> Result<(String, String), String> {
@@ -36,10 +52,26 @@ impl SceneArgs {
         description: &Description,
         log: &mut dyn Write,
     ) -> anyhow::Result<Resolved> {
-        let resolved = resolve(description)
-            .with_context(|| format!("{} can't be rendered", self.scene.display()))?;
+        self.resolve_beside(description, RenderSettings::new(description).memory(), log)
+    }
+
+    /// As [`SceneArgs::resolve`], if the scene and a film of so many bytes fit into
+    /// the memory.
+    pub fn resolve_beside(
+        &self,
+        description: &Description,
+        film: u64,
+        log: &mut dyn Write,
+    ) -> anyhow::Result<Resolved> {
+        let context = || format!("{} can't be rendered", self.scene.display());
+        let budget = self.memory.map_or_else(Budget::of_machine, Budget::new);
+        let [width, height] = [description.film.width, description.film.height];
+        budget
+            .take(film, format!("a film of {width} × {height} pixels"))
+            .with_context(context)?;
+        let resolved = resolve_within(description, &budget).with_context(context)?;
         for repair in &resolved.repairs {
-            writeln!(log, "warning: {repair}")?;
+            writeln!(log, "warning: {}", bounded(repair, MAX_WARNING))?;
         }
         Ok(resolved)
     }

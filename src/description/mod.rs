@@ -36,9 +36,14 @@ pub use value::{Color, Scalar};
 
 use problem::Sources;
 
+use crate::memory::Budget;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// How many bytes of memory reading takes for each byte of a scene file: a million
+/// objects of a mesh and a place in space, measured.
+const MEMORY_PER_BYTE: u64 = 12;
 
 /// How files begin that are given for scenes by mistake, and what to say.
 const OTHER_FORMATS: [(&[u8], &str); 7] = [
@@ -109,6 +114,10 @@ impl Description {
         let whole = |message| Problems::new(vec![Problem::of_source(&name, message)]);
         let cannot_read = |error| whole(format!("the scene can't be read: {error}"));
         let mut file = crate::file::open(path).map_err(cannot_read)?;
+        let length = file.metadata().map_err(cannot_read)?.len();
+        Budget::of_machine()
+            .take(length.saturating_mul(MEMORY_PER_BYTE), "the scene file")
+            .map_err(|error| whole(error.to_string()))?;
         let mut bytes = Vec::new();
         std::io::Read::read_to_end(&mut file, &mut bytes).map_err(cannot_read)?;
         for (beginning, found) in OTHER_FORMATS {

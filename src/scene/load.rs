@@ -46,10 +46,13 @@ impl Assets {
                     uvs: *uvs,
                     normals: true,
                 };
-                Some((
-                    name.clone(),
-                    Mesh::load(&path, wanted).map_err(|e| e.to_string()),
-                ))
+                // A mesh takes about as much as its text.
+                let length = std::fs::metadata(&path).map_or(0, |file| file.len());
+                let loaded = budget
+                    .take(length, format!("the mesh {}", path.display()))
+                    .map_err(|e| e.to_string())
+                    .and_then(|()| Mesh::load(&path, wanted).map_err(|e| e.to_string()));
+                Some((name.clone(), loaded))
             })
             .collect();
         let images = Images::new(budget);

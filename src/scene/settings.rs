@@ -88,6 +88,18 @@ impl RenderSettings {
         }
     }
 
+    /// The bytes that the film, the pilots of path splitting and the finished
+    /// images take at once: measured per pixel, by the peak of whole renders.
+    #[must_use]
+    pub fn memory(&self) -> u64 {
+        const COLOR: u64 = 122;
+        const PILOTS: u64 = 112;
+        const AOV: u64 = 54;
+        let pilots = if self.branches == Some(1) { 0 } else { PILOTS };
+        let aovs = self.aovs.iter().count() as u64;
+        self.window.area() as u64 * (COLOR + pilots + AOV * aovs)
+    }
+
     /// An empty film for the window, which must lie within the image.
     #[must_use]
     pub fn film(&self) -> Film {
