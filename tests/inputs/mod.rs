@@ -1,6 +1,7 @@
 //! Files as other programs write them, one table for each kind of file: read
 //! right, or refused by name.
 
+mod command;
 mod files;
 mod images;
 mod meshes;

@@ -1,0 +1,19 @@
+#![no_main]
+//! An image of any format, as texture and as environment.
+
+mod file;
+
+use libfuzzer_sys::fuzz_target;
+use smithwalk::memory::Budget;
+use smithwalk::texture::{ColorSpace, Images, Interpolation, load_environment};
+
+fuzz_target!(|bytes: &[u8]| {
+    let path = file::written("texture", bytes);
+    let budget = Budget::new(1 << 28);
+    let images = Images::new(&budget);
+    let bilinear = Interpolation::Bilinear;
+    if let Ok((texture, _)) = images.texture(&path, ColorSpace::Srgb, bilinear, [1.0; 2], [0.0; 2]) {
+        assert!(texture.sample([0.3, 0.7]).iter().all(|x| x.is_finite()));
+    }
+    let _ = load_environment(&path, &Budget::new(1 << 28));
+});
