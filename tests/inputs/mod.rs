@@ -3,8 +3,12 @@
 
 mod command;
 mod files;
+// Tables with a case on each line.
+#[rustfmt::skip]
 mod images;
+#[rustfmt::skip]
 mod meshes;
+#[rustfmt::skip]
 mod scenes;
 
 /// Fails with all that is wrong at once.
