@@ -112,7 +112,7 @@ fn keys_and_types() {
         ),
         (
             "a texture for what takes none",
-            "textures: {t: {file: t.png}}\nmaterials: {m: {dielectric: {ior: {texture: t}}}}"
+            "textures: {t: {file: t.png}}\nworld: {constant: {color: {texture: t}}}"
         ),
     ]));
 }
