@@ -1,16 +1,11 @@
 #![no_main]
-//! A saved film to resume.
+//! A saved film, as `--resume` and `merge` read it.
 
 mod file;
 
 use libfuzzer_sys::fuzz_target;
-use smithwalk::film::{AovSet, Film};
-use smithwalk::image::Window;
+use smithwalk::film::SavedFilm;
 
 fuzz_target!(|bytes: &[u8]| {
-    let path = file::written("film", bytes);
-    let mut film = Film::new([4, 4], Window::full([4, 4]), AovSet::NONE);
-    if film.resume(&path, 0).is_ok() {
-        let _ = film.develop();
-    }
+    let _ = SavedFilm::read(&file::written("film", bytes));
 });
