@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aov {
-    /// Directional albedo of the first surface, in [0, 1]; 0 where there is none.
+    /// The colour of the first surface, of its facets, its base or what it lets
+    /// through, which noise filters take for the albedo; 0 where there is none.
     Albedo,
     /// Shading normal of the first surface in world space, averaged over the
     /// samples and hence shorter than 1 at edges; 0 where there is none.

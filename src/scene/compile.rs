@@ -1,15 +1,19 @@
 //! From what the file says of a material to what is rendered, and to what that
 //! needs: names become indices, mixes flat lists, the estimator is chosen.
 
+mod principled;
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
 use arrayvec::ArrayVec;
 
 use super::material::{
-    Facet, Factor, Leaf, Material, Number, Principled3, Principled4, Reflectance, RoughMaterial,
-    Roughness, Setup, Tangent, Tint, WeightedLeaf,
+    Facet, Factor, Leaf, Material, Number, Reflectance, RoughMaterial, Roughness, Tangent, Tint,
+    WeightedLeaf,
 };
-use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, Rises, WhiteFacets};
+use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, WhiteFacets};
 use crate::color::Rgb;
 use crate::description as desc;
 use crate::features::Features;
@@ -401,140 +405,6 @@ impl<'a> Compiler<'a> {
             facet,
             method,
         }))
-    }
-
-    fn principled(&mut self, node: &desc::Principled) -> Result<Leaf, MaterialError> {
-        self.need_if(
-            Features::PRINCIPLED
-                .with(Features::MIXES)
-                .with(Features::METALS),
-            true,
-        );
-        match &node.sockets {
-            desc::Sockets::V3(sockets) => self.principled3(node, sockets),
-            desc::Sockets::V4(sockets) => self.principled4(node, sockets),
-        }
-    }
-
-    /// What both nodes share; `glass` is how the facets of glass scatter.
-    fn setup(
-        &mut self,
-        node: &desc::Principled,
-        isotropic: bool,
-        once: Method,
-        ior: Number,
-        transmits: bool,
-    ) -> Result<Setup, MaterialError> {
-        let white = Tint::Constant(Rgb::ONE);
-        let (reflecting, glass) = if node.multiple {
-            let method = |facet| self.method(desc::Scattering::Multiple, Distribution::Ggx, facet);
-            let reflecting = method(Facet::Metal(Reflectance::Constant(white)))?;
-            let glass = if transmits {
-                method(Facet::Glass(ior, white))?
-            } else {
-                Method::Single
-            };
-            (reflecting, Some(glass))
-        } else {
-            (once, None)
-        };
-        self.need_if(Features::MULTIPLE_SCATTERING, reflecting.is_multiple());
-        self.need_if(
-            Features::TRANSMISSION.with(Features::SPLIT_GLASS),
-            transmits,
-        );
-        Ok(Setup {
-            tangent: self.tangent(node.tangent, isotropic),
-            reflecting,
-            glass,
-            rises: Rises::of_ggx(),
-        })
-    }
-
-    fn principled3(
-        &mut self,
-        node: &desc::Principled,
-        sockets: &desc::Principled3,
-    ) -> Result<Leaf, MaterialError> {
-        let alpha = self.number(&sockets.alpha)?;
-        self.need_if(Features::TRANSPARENCY, !alpha.is(1.0));
-        self.need_if(Features::DIFFUSERS, true);
-        let anisotropic = self.number(&sockets.anisotropic)?;
-        let ior = self.number(&sockets.ior)?;
-        let transmission = self.number(&sockets.transmission)?;
-        let subsurface = self.number(&sockets.subsurface)?;
-        if !subsurface.is(0.0) {
-            self.note("subsurface scattering is a diffuse base of the same colour");
-        }
-        let transmits = !transmission.is(0.0);
-        let setup = self.setup(node, anisotropic.is(0.0), Method::Separable, ior, transmits)?;
-        Ok(Leaf::Principled3(Box::new(Principled3 {
-            setup,
-            base_color: self.tint(&sockets.base_color)?,
-            subsurface,
-            subsurface_color: self.tint(&sockets.subsurface_color)?,
-            metallic: self.number(&sockets.metallic)?,
-            specular: self.number(&sockets.specular)?,
-            specular_tint: self.number(&sockets.specular_tint)?,
-            roughness: self.number(&sockets.roughness)?,
-            anisotropic,
-            anisotropic_rotation: self.number(&sockets.anisotropic_rotation)?,
-            sheen: self.number(&sockets.sheen)?,
-            sheen_tint: self.number(&sockets.sheen_tint)?,
-            clearcoat: self.number(&sockets.clearcoat)?,
-            clearcoat_roughness: self.number(&sockets.clearcoat_roughness)?,
-            ior,
-            transmission,
-            transmission_roughness: self.number(&sockets.transmission_roughness)?,
-            emission: self.tint(&sockets.emission)?,
-            emission_strength: self.number(&sockets.emission_strength)?,
-            alpha,
-        })))
-    }
-
-    fn principled4(
-        &mut self,
-        node: &desc::Principled,
-        sockets: &desc::Principled4,
-    ) -> Result<Leaf, MaterialError> {
-        let alpha = self.number(&sockets.alpha)?;
-        self.need_if(Features::TRANSPARENCY, !alpha.is(1.0));
-        let anisotropic = self.number(&sockets.anisotropic)?;
-        let ior = self.number(&sockets.ior)?;
-        let transmission_weight = self.number(&sockets.transmission_weight)?;
-        let diffuse_roughness = self.number(&sockets.diffuse_roughness)?;
-        self.need_if(Features::DIFFUSERS, !diffuse_roughness.is(0.0));
-        if sockets.subsurface_weight != desc::Scalar::Value(0.0) {
-            self.note("subsurface scattering is a diffuse base of the same colour");
-        }
-        if sockets.sheen_weight != desc::Scalar::Value(0.0) {
-            self.note("the sheen of Cycles 4 and later is left out");
-        }
-        let transmits = !transmission_weight.is(0.0);
-        let setup = self.setup(node, anisotropic.is(0.0), Method::Single, ior, transmits)?;
-        let leaf = Principled4 {
-            setup,
-            base_color: self.tint(&sockets.base_color)?,
-            metallic: self.number(&sockets.metallic)?,
-            roughness: self.number(&sockets.roughness)?,
-            ior,
-            alpha,
-            diffuse_roughness,
-            specular_ior_level: self.number(&sockets.specular_ior_level)?,
-            specular_tint: self.tint(&sockets.specular_tint)?,
-            anisotropic,
-            anisotropic_rotation: self.number(&sockets.anisotropic_rotation)?,
-            transmission_weight,
-            coat_weight: self.number(&sockets.coat_weight)?,
-            coat_roughness: self.number(&sockets.coat_roughness)?,
-            coat_ior: self.number(&sockets.coat_ior)?,
-            coat_tint: self.tint(&sockets.coat_tint)?,
-            emission_color: self.tint(&sockets.emission_color)?,
-            emission_strength: self.number(&sockets.emission_strength)?,
-        };
-        let shines = !leaf.emission_strength.is(0.0);
-        self.need_if(Features::VIEW_DEPENDENT, shines && leaf.is_coated());
-        Ok(Leaf::Principled4(Box::new(leaf)))
     }
 
     /// Keeps what people are told of a material that is rendered otherwise than
