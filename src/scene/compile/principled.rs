@@ -75,6 +75,10 @@ impl Compiler<'_> {
         }
         let transmits = !transmission.is(0.0);
         let setup = self.setup(node, anisotropic.is(0.0), Method::Separable, ior, transmits)?;
+        let emission_strength = self.number(&sockets.emission_strength)?;
+        let shines = sockets.emission != desc::Color::Value([0.0; 3]) && !emission_strength.is(0.0);
+        // What a light sample brings is not the mean then, but looked up.
+        self.need_if(Features::VIEW_DEPENDENT, shines && !alpha.is(1.0));
         Ok(Leaf::Principled3(Box::new(Principled3 {
             setup,
             base_color: self.tint(&sockets.base_color)?,
@@ -94,7 +98,7 @@ impl Compiler<'_> {
             transmission,
             transmission_roughness: self.number(&sockets.transmission_roughness)?,
             emission: self.tint(&sockets.emission)?,
-            emission_strength: self.number(&sockets.emission_strength)?,
+            emission_strength,
             alpha,
         })))
     }
@@ -139,8 +143,10 @@ impl Compiler<'_> {
             emission_color: self.tint(&sockets.emission_color)?,
             emission_strength: self.number(&sockets.emission_strength)?,
         };
+        // What a light sample brings is not the mean then, but looked up.
+        let dimmed = leaf.is_coated() || !leaf.alpha.is(1.0);
         let shines = !leaf.emission_strength.is(0.0);
-        self.need_if(Features::VIEW_DEPENDENT, shines && leaf.is_coated());
+        self.need_if(Features::VIEW_DEPENDENT, shines && dimmed);
         Ok(Leaf::Principled4(Box::new(leaf)))
     }
 }
