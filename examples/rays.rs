@@ -21,7 +21,7 @@ use smithwalk::film::{AovSet, PixelFilter};
 use smithwalk::integrator::{Control, RenderReport, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene, resolve};
 
-/// Samples per pixel: some of those that split as planned after the pilots, ten to thirty
+/// Samples per pixel, the pilots before them left alone: ten to thirty
 /// million rays for the scenes of the repository.
 const SPP: u32 = 8;
 

@@ -108,7 +108,7 @@ fn leaving_features_out_changes_no_bit() {
         kernels.insert(kernel_for(loaded.scene.features));
         let settings = Settings {
             window: Some(middle(loaded.settings.resolution)),
-            ..Settings::spp(4)
+            ..Settings::spp(1)
         };
         let lean = film(&loaded, settings, &[]);
         let full = film(
