@@ -20,4 +20,5 @@ mod inputs;
 mod light;
 mod parity;
 mod render;
+mod shading_normals;
 mod validate;

@@ -5,6 +5,7 @@ use glam::Vec3;
 use wide::f32x8;
 
 use super::closure::{Laned, MIN_COS};
+use super::horizons::Horizons;
 use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
 use crate::features::{Features, has};
@@ -101,9 +102,11 @@ impl<const F: u32> Bsdf<F> {
         if !part.closure.is_in::<F>() {
             return None;
         }
-        let sample = part.closure.sample(part.frame.to_local(wo), rng)?;
-        let wi = part.frame.to_world(sample.wi);
-        if !self.same_side(wi, sample.wi.z) {
+        let horizons = part.horizons(self.normal);
+        let wo = part.frame.to_local(horizons.viewer(wo));
+        let sample = part.closure.sample(wo, rng)?;
+        let (wi, _) = horizons.to_true(part.frame.to_world(sample.wi));
+        if !same_side(self.normal, wi, sample.wi.z) {
             return None;
         }
         Some(ScatterSample {
@@ -138,20 +141,19 @@ impl<const F: u32> Bsdf<F> {
         tally: &mut impl Tally<f32>,
     ) {
         for part in self.known() {
-            let local = part.frame.to_local(wi);
-            if !self.same_side(wi, local.z) {
+            let Some(Seen { wo, wi, density }) = part.see(self.normal, wo, wi) else {
                 continue;
-            }
-            let local_wo = part.frame.to_local(wo);
-            if has::<F>(Features::MIXES) {
-                let mut scaled = Scaled {
-                    weight: part.weight.into(),
-                    tally: &mut *tally,
-                };
-                part.closure.eval(local_wo, local, rng, &mut scaled);
+            };
+            let weight = if has::<F>(Features::MIXES) {
+                part.weight * density
             } else {
-                part.closure.eval(local_wo, local, rng, tally);
-            }
+                Rgb::splat(density)
+            };
+            let mut scaled = Scaled {
+                weight: weight.into(),
+                tally: &mut *tally,
+            };
+            part.closure.eval(wo, wi, rng, &mut scaled);
         }
     }
 
@@ -177,12 +179,9 @@ impl<const F: u32> Bsdf<F> {
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let density = |part: &WeightedClosure| {
-            let local = part.frame.to_local(wi);
-            if self.same_side(wi, local.z) {
-                part.closure.pdf(part.frame.to_local(wo), local)
-            } else {
-                0.0
-            }
+            part.see(self.normal, wo, wi).map_or(0.0, |seen| {
+                part.closure.pdf(seen.wo, seen.wi) * seen.density
+            })
         };
         if !has::<F>(Features::MIXES) {
             return self.known().next().map_or(0.0, density);
@@ -218,16 +217,39 @@ impl<const F: u32> Bsdf<F> {
         // Rounding may leave a hair's breadth past the last one.
         self.closures.last()
     }
+}
 
-    /// Interpolated normals make directions that are above the shading normal's
-    /// horizon and below the true surface's, or the other way round: such light
-    /// would leak through, so it is refused both when sampling and evaluating.
-    fn same_side(&self, wi: Vec3, local_z: f32) -> bool {
-        same_side(self.normal, wi, local_z)
+/// Directions in a closure's frame, as the horizon of its normal makes them.
+struct Seen {
+    wo: Vec3,
+    wi: Vec3,
+    /// The factor on densities over `wi`.
+    density: f32,
+}
+
+impl WeightedClosure {
+    #[inline(always)]
+    fn horizons(&self, geometric: Vec3) -> Horizons {
+        Horizons::new(self.frame.z, geometric)
+    }
+
+    /// Both directions in the closure's frame; `None` where it sends nothing.
+    #[inline(always)]
+    fn see(&self, geometric: Vec3, wo: Vec3, wi: Vec3) -> Option<Seen> {
+        let horizons = self.horizons(geometric);
+        let (moved, density) = horizons.to_closure(wi)?;
+        let local = self.frame.to_local(moved);
+        same_side(geometric, wi, local.z).then(|| Seen {
+            wo: self.frame.to_local(horizons.viewer(wo)),
+            wi: local,
+            density,
+        })
     }
 }
 
-/// See [`Bsdf::same_side`].
+/// Whether `wi` is on the side of the true surface that a closure means by this
+/// cosine. Beside the horizon rounding may bring it to the other.
+#[inline(always)]
 fn same_side(normal: Vec3, wi: Vec3, local_z: f32) -> bool {
     wi.dot(normal) * local_z > 0.0
 }
@@ -248,7 +270,8 @@ impl<const F: u32> InLanes<'_, F> {
         wo: Vec3,
         rng: &mut impl Draw<f32x8>,
     ) -> [Option<(ScatterSample, f32)>; LANES] {
-        let wo = self.part.frame.to_local(wo);
+        let horizons = self.part.horizons(self.normal);
+        let wo = self.part.frame.to_local(horizons.viewer(wo));
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return [None; LANES];
         }
@@ -259,7 +282,7 @@ impl<const F: u32> InLanes<'_, F> {
         };
         exits.map(|exit| {
             let (sample, pdf) = exit.filter(|(sample, _)| sample.is_usable())?;
-            let wi = self.part.frame.to_world(sample.wi);
+            let (wi, density) = horizons.to_true(self.part.frame.to_world(sample.wi));
             let lit = same_side(self.normal, wi, sample.wi.z);
             let sample = ScatterSample {
                 wi,
@@ -268,7 +291,7 @@ impl<const F: u32> InLanes<'_, F> {
                 delta: false,
                 straight: false,
             };
-            lit.then_some((sample, pdf))
+            lit.then_some((sample, pdf * density))
         })
     }
 
@@ -281,16 +304,23 @@ impl<const F: u32> InLanes<'_, F> {
         wi: [Vec3; LANES],
         rng: &mut impl Draw<f32x8>,
     ) -> [ByOrder; LANES] {
-        let wo = self.part.frame.to_local(wo);
+        let horizons = self.part.horizons(self.normal);
+        let wo = self.part.frame.to_local(horizons.viewer(wo));
         if wo.z.is_nan() || wo.z <= MIN_COS {
             return [ByOrder::ZERO; LANES];
         }
-        let local = wi.map(|wi| {
-            let local = self.part.frame.to_local(wi);
-            let lit = local.z > MIN_COS && same_side(self.normal, wi, local.z);
+        let mut densities = [1.0; LANES];
+        let mut local = [Vec3::NEG_Z; LANES];
+        for (i, &wi) in wi.iter().enumerate() {
             // No light comes from below a metal.
-            if lit { local } else { Vec3::NEG_Z }
-        });
+            let Some((moved, density)) = horizons.to_closure(wi) else {
+                continue;
+            };
+            let moved = self.part.frame.to_local(moved);
+            if moved.z > MIN_COS && same_side(self.normal, wi, moved.z) {
+                (local[i], densities[i]) = (moved, density);
+            }
+        }
         let values = match self.closure {
             Laned::Ggx(rough) => rough.eval_lanes(wo, local, rng),
             Laned::Beckmann(rough) if has::<F>(Features::BECKMANN) => {
@@ -298,7 +328,7 @@ impl<const F: u32> InLanes<'_, F> {
             }
             Laned::Beckmann(_) => [ByOrder::ZERO; LANES],
         };
-        values.map(|value| value * self.part.weight)
+        std::array::from_fn(|i| values[i] * (self.part.weight * densities[i]))
     }
 }
 

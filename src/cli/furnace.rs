@@ -54,7 +54,9 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let passed = table
         .iter()
         .all(|r| within(r.sampled, r.sampled_se) && within(r.combined, r.combined_se))
-        && rendered.iter().all(|r| within(r.mean, r.se));
+        && rendered
+            .iter()
+            .all(|r| within(r.furnace.mean, r.furnace.se));
     if args.json {
         let report = json!({
             "table": table.iter().map(table::Row::to_json).collect::<Vec<_>>(),

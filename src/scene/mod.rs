@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, within_reach};
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
@@ -144,7 +144,7 @@ impl Scene {
                 };
                 let world = Vec3::from(world).try_normalize().unwrap_or(geometric);
                 let facing = if front { world } else { -world };
-                towards_viewer(facing, geometric_normal, -ray.direction)
+                within_reach(facing, geometric_normal)
             }
             _ => geometric_normal,
         };
@@ -270,48 +270,5 @@ impl Scene {
     pub fn albedo(&self, surface: &Surface, view: View) -> Rgb {
         let point = Point::shaded(&self.textures, surface, view);
         self.materials[surface.material].albedo(&point)
-    }
-}
-
-/// An interpolated normal may face away from the viewer near silhouettes, where
-/// a closure would have nothing to say. Tilts it towards the geometric normal
-/// just far enough that the viewer is above its horizon.
-fn towards_viewer(normal: Vec3, geometric: Vec3, viewer: Vec3) -> Vec3 {
-    /// Cosine that is left between normal and viewer after the tilt.
-    const GRAZING: f32 = 1e-3;
-    let cos = normal.dot(viewer);
-    if cos >= GRAZING {
-        return normal;
-    }
-    let cos_geometric = geometric.dot(viewer);
-    // Solve (normal + k · geometric) · viewer = GRAZING · cos_geometric; the
-    // target shrinks with the geometric cosine so that there is a solution.
-    let target = GRAZING * cos_geometric;
-    let k = (target - cos) / cos_geometric.max(1e-6);
-    (normal + geometric * k.max(0.0))
-        .try_normalize()
-        .unwrap_or(geometric)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_normal_that_faces_away_is_tilted_just_above_the_horizon() {
-        let geometric = Vec3::Z;
-        let viewer = Vec3::new(1.0, 0.0, 0.1).normalize();
-        let away = Vec3::new(-0.6, 0.0, 0.8);
-        assert!(away.dot(viewer) < 0.0);
-        let tilted = towards_viewer(away, geometric, viewer);
-        assert!(
-            tilted.dot(viewer) > 0.0 && tilted.dot(viewer) < 1e-3,
-            "{tilted}"
-        );
-        assert_eq!(
-            towards_viewer(geometric, geometric, viewer),
-            geometric,
-            "left alone"
-        );
     }
 }
