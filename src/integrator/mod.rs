@@ -5,7 +5,6 @@ mod pass;
 mod path;
 mod render;
 mod split;
-mod sum;
 
 pub use kernel::{KERNELS, kernel_for};
 pub use path::{FirstHit, PathResult, PathTracer, Split};

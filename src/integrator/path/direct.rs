@@ -1,0 +1,148 @@
+//! Light samples: next-event estimation at a vertex of a path.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::mean::Mean;
+use super::result::Found;
+use super::state::Path;
+use super::tracer::{MAX_STRAIGHT, PathTracer};
+use crate::bsdf::Bsdf;
+use crate::color::Rgb;
+use crate::embree::Ray;
+use crate::features::{Features, has};
+use crate::integrator::split::Spread;
+use crate::light::{EmitterId, LightSample};
+use crate::sampler::{Dimension, Purpose, Sampler};
+use crate::scene::{Surface, View};
+
+/// Where shadow rays to points of the scene's own meshes end, as a share of the
+/// distance: short of the emitting triangle itself.
+const SHORT_OF_EMITTER: f32 = 1.0 - 1e-4;
+
+/// A light sample that reaches a surface.
+#[derive(Clone, Copy)]
+pub(super) struct Arriving {
+    /// Unit length, towards the light.
+    pub wi: Vec3,
+    /// L/p times the weight against BSDF samples.
+    pub light: Rgb,
+}
+
+impl<const F: u32> PathTracer<'_, F> {
+    /// The mean of the light samples with these indices at the surface that `path` has
+    /// come to.
+    pub(super) fn light_samples(
+        &self,
+        indices: Range<u32>,
+        path: &Path,
+        surface: &Surface,
+        bsdf: &Bsdf<F>,
+        sampler: &mut Sampler,
+    ) -> (Found, Spread) {
+        let mut mean = Mean::new(indices.len(), self.pilot);
+        for index in indices {
+            sampler.set_index(index);
+            let mut found = Found::default();
+            self.light_sample(path, surface, bsdf, sampler, &mut found);
+            mean.add(found);
+        }
+        mean.finish()
+    }
+
+    /// Adds one light sample, f·|cosθ|·L/p with its multiple-importance weight, at the
+    /// surface that `path` has come to.
+    pub(super) fn light_sample(
+        &self,
+        path: &Path,
+        surface: &Surface,
+        bsdf: &Bsdf<F>,
+        sampler: &mut Sampler,
+        found: &mut Found,
+    ) {
+        if !has::<F>(Features::LIGHT_SAMPLING) || !bsdf.has_smooth() {
+            return;
+        }
+        let Some(arriving) = self.arriving(path, surface, bsdf, sampler, &mut found.rays) else {
+            return;
+        };
+        let wo = -path.ray.direction;
+        let mut stream = sampler.walk_stream(path.vertex, Purpose::Light);
+        let scattered = bsdf.eval(wo, arriving.wi, &mut stream) * arriving.light;
+        path.deposit_scattered(scattered, &mut found.radiance);
+    }
+
+    /// Draws a light sample, if it reaches the surface and that can scatter it.
+    pub(super) fn arriving(
+        &self,
+        path: &Path,
+        surface: &Surface,
+        bsdf: &Bsdf<F>,
+        sampler: &mut Sampler,
+        rays: &mut u32,
+    ) -> Option<Arriving> {
+        let choice = sampler.get_1d(Dimension::light_choice(path.vertex));
+        let position = sampler.get_2d(Dimension::light_position(path.vertex));
+        let lights = &self.scene.lights;
+        let light = lights.sample(self.scene.receiver(surface), choice, position)?;
+        let pdf = bsdf.pdf(-path.ray.direction, light.direction);
+        if pdf <= 0.0 {
+            return None;
+        }
+        let radiance = self.visible(surface, &light, rays)?;
+        // The power heuristic's weight over the density; a delta light has no rival.
+        let factor = if light.delta {
+            1.0 / light.pdf
+        } else {
+            light.pdf / (light.pdf * light.pdf + pdf * pdf)
+        };
+        Some(Arriving {
+            wi: light.direction,
+            light: radiance * factor,
+        })
+    }
+
+    /// The radiance of the light sample that reaches the surface; `None` when it
+    /// is in shadow.
+    fn visible(&self, surface: &Surface, light: &LightSample, rays: &mut u32) -> Option<Rgb> {
+        let mut ray = surface.spawn(light.direction);
+        ray.t_far = light.distance;
+        let mut radiance = light.radiance;
+        if has::<F>(Features::EMISSIVE_MESHES) {
+            if let Some((EmitterId(emitter), barycentric)) = light.emitter {
+                ray.t_far *= SHORT_OF_EMITTER;
+                // Where all points shine alike the sample's own radiance is exact.
+                if has::<F>(Features::TEXTURES) || has::<F>(Features::VIEW_DEPENDENT) {
+                    let wo = -light.direction;
+                    radiance = self.scene.emission_at(emitter, barycentric, wo);
+                }
+            }
+        }
+        *rays += 1;
+        if !has::<F>(Features::TRANSPARENCY) {
+            return (!self.scene.accelerator.occluded(ray)).then_some(radiance);
+        }
+        for _ in 0..MAX_STRAIGHT {
+            let Some(hit) = self.scene.accelerator.intersect(ray) else {
+                return Some(radiance);
+            };
+            let blocker = self.scene.surface::<F>(&ray, &hit);
+            let view = View {
+                wo: -ray.direction,
+                camera: false,
+            };
+            radiance *= self.scene.bsdf::<F>(&blocker, view).transparency();
+            if radiance.max_element() <= 0.0 {
+                return None;
+            }
+            let t_far = ray.t_far - hit.t;
+            ray = Ray {
+                t_far,
+                ..blocker.spawn(ray.direction)
+            };
+            *rays += 1;
+        }
+        None
+    }
+}

@@ -1,0 +1,71 @@
+//! Light that BSDF samples find: lamps crossed, surfaces that shine, the world.
+
+use super::state::Path;
+use super::tracer::PathTracer;
+use crate::color::Rgb;
+use crate::embree::Ray;
+use crate::features::{Features, has};
+use crate::light::EmitterId;
+use crate::scene::Surface;
+
+impl<const F: u32> PathTracer<'_, F> {
+    /// What the lights without geometry add along the path's ray, up to a surface at
+    /// distance `to_surface`.
+    pub(super) fn lamps(&self, path: &Path, to_surface: Option<f32>) -> Rgb {
+        if !has::<F>(Features::AREA_LIGHTS) {
+            return Rgb::ZERO;
+        }
+        let Path { ray, last, .. } = path;
+        let mut sum = Rgb::ZERO;
+        // Densities are those at the last vertex, so that is where the segment starts.
+        let segment = Ray {
+            origin: last.receiver.position,
+            t_near: last.travelled,
+            t_far: to_surface.map_or(f32::INFINITY, |t| last.travelled + t),
+            ..*ray
+        };
+        let camera = path.bounce == 0;
+        self.scene.lights.crossed(
+            &segment,
+            last.receiver.normal,
+            camera,
+            |radiance, light_pdf| {
+                sum += radiance * last.mis_weight(light_pdf);
+            },
+        );
+        sum
+    }
+
+    /// What a ray that leaves the scene brings.
+    pub(super) fn world(&self, path: &Path) -> Rgb {
+        let lights = &self.scene.lights;
+        let (radiance, light_pdf) = lights.world(path.last.receiver, path.ray.direction);
+        if has::<F>(Features::LIGHT_SAMPLING) {
+            radiance * path.last.mis_weight(light_pdf)
+        } else {
+            radiance
+        }
+    }
+
+    /// What a surface shines by itself.
+    pub(super) fn surface_emission(&self, path: &Path, surface: &Surface) -> Rgb {
+        let Some(first) = self.scene.objects[surface.object].first_emitter else {
+            return Rgb::ZERO;
+        };
+        let radiance = self.scene.emission(surface, path.view());
+        if radiance == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        let last = &path.last;
+        let light_pdf = match last.pdf {
+            Some(_) => self.scene.lights.triangle_pdf(
+                last.receiver,
+                EmitterId(first + surface.triangle),
+                surface.position,
+                surface.geometric_normal,
+            ),
+            None => 0.0,
+        };
+        radiance * last.mis_weight(light_pdf)
+    }
+}

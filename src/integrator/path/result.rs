@@ -1,0 +1,89 @@
+//! What a camera path is asked for, and what it finds.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use crate::bsdf::ByOrder;
+use crate::color::Rgb;
+use crate::film::{Aov, Sample};
+use crate::integrator::split::Spread;
+
+/// Into what a camera path splits at the first surface that scatters it: each
+/// draws the numbers of an index of its own from the pixel's
+/// [`crate::sampler::Sampler`].
+#[derive(Clone, Debug)]
+pub struct Split {
+    /// Ways in which it goes on.
+    pub branches: Range<u32>,
+    /// Samples of the light that arrives there directly.
+    pub light_samples: Range<u32>,
+}
+
+/// The light that a part of a path found, and what that took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    /// Radiance, W·m⁻²·sr⁻¹.
+    pub radiance: ByOrder,
+    /// Rays traced, shadow rays among them.
+    pub rays: u32,
+}
+
+/// Light carried by one path, and what its first hit looked like.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PathResult {
+    /// Radiance, W·m⁻²·sr⁻¹.
+    pub radiance: ByOrder,
+    /// What the first surface is, if the camera ray met one and AOVs want it.
+    pub first: Option<FirstHit>,
+    /// Rays traced, shadow rays among them.
+    pub rays: u32,
+    /// How the light samples at the first surface that scatters differ.
+    pub light_samples: Spread,
+    /// How the branches behind it differ.
+    pub branches: Spread,
+}
+
+/// What AOVs say about the first surface.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHit {
+    /// See [`crate::scene::Material::albedo`].
+    pub albedo: Rgb,
+    /// Shading normal, world space, on the viewer's side of the surface.
+    pub normal: Vec3,
+    /// Distance along the camera ray, metres.
+    pub distance: f32,
+}
+
+impl PathResult {
+    /// Of a path without a surface, or up to its first one.
+    pub(super) fn of(found: Found) -> Self {
+        Self {
+            radiance: found.radiance,
+            rays: found.rays,
+            ..Self::default()
+        }
+    }
+
+    /// Adds what a part of the path behind its first surface found.
+    pub(super) fn add(&mut self, found: Found) {
+        self.radiance += found.radiance;
+        self.rays += found.rays;
+    }
+
+    /// As the film takes it; `depth_scale` turns the distance along the ray
+    /// into the depth along the view axis.
+    #[must_use]
+    pub fn to_sample(self, depth_scale: f32) -> Sample {
+        let sample = Sample::of(self.radiance.total().to_array())
+            .with(Aov::Single, self.radiance.single.to_array())
+            .with(Aov::Multiple, self.radiance.multiple.to_array());
+        match self.first {
+            Some(first) => sample
+                .with(Aov::Albedo, first.albedo.to_array())
+                .with(Aov::Normal, first.normal.to_array())
+                .with(Aov::Depth, [first.distance * depth_scale; 3]),
+            None => sample,
+        }
+    }
+}
