@@ -8,8 +8,12 @@ use glam::Vec3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use smithwalk::bsdf::Bsdf;
-use smithwalk::description::{Estimator, Material};
-use smithwalk::scene::{self, Names, Surface, View, compile_material};
+use smithwalk::description::{Description, Estimator, Material};
+use smithwalk::embree::Ray;
+use smithwalk::features::Features;
+use smithwalk::memory::Budget;
+use smithwalk::mesh::Mesh;
+use smithwalk::scene::{self, Assets, Surface, View, assemble, compile_alone};
 use smithwalk_model::{Draw, LANES, Stream};
 use wide::f32x8;
 
@@ -43,21 +47,14 @@ const MATERIALS: [(&str, bool); 13] = [
 const TILTS: [f32; 4] = [0.02, 0.3, 0.9, 1.5];
 
 fn material(text: &str) -> scene::Material {
-    let names = Names {
-        materials: &BTreeMap::new(),
-        textures: &BTreeMap::new(),
-        estimator: Estimator::Auto,
-    };
     let material = Material::from_yaml(text).unwrap_or_else(|e| panic!("{text}: {e}"));
-    compile_material(&material, &names).expect("known names")
+    compile_alone(&material, Estimator::Auto).expect("no names")
 }
 
 /// The material on a horizontal surface whose shading normal leans towards x.
 fn leaning(material: &scene::Material, tilt: f32, wo: Vec3) -> Bsdf {
-    let surface = Surface {
-        normal: Vec3::new(tilt.sin(), 0.0, tilt.cos()),
-        ..Surface::horizontal(true)
-    };
+    let normal = Vec3::new(tilt.sin(), 0.0, tilt.cos());
+    let surface = Surface::horizontal(true).with_normal(normal);
     material.bsdf(&[], &surface, View { wo, camera: false })
 }
 
@@ -195,5 +192,48 @@ fn lanes_bend_directions_as_single_calls_do() {
                 );
             }
         }
+    }
+}
+
+/// A mirrored texture, a mirrored object and a look from behind each turn the tangents'
+/// handedness, and two of them turn it back.
+#[test]
+fn tangents_know_their_handedness() {
+    for bits in 0..8 {
+        let [texture, object, behind] = [1, 2, 4].map(|bit| bits & bit != 0);
+        let sign = |mirrored| if mirrored { -1.0 } else { 1.0 };
+        let text = format!(
+            "smithwalk: 1\n\
+             materials: {{m: {{conductor: {{alpha_x: 0.1, alpha_y: 0.2}}}}}}\n\
+             meshes: {{quad: {{file: quad.obj}}}}\n\
+             objects: [{{mesh: quad, material: m, transform: {{scale: [{}, 1, 1]}}}}]\n",
+            sign(object)
+        );
+        let quad = Mesh {
+            positions: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            uvs: Some(
+                [[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]]
+                    .map(|[u, v]| [u * sign(texture), v])
+                    .to_vec(),
+            ),
+            ..Mesh::default()
+        };
+        let description = Description::from_str(&text, "quad", &[]).expect("reads");
+        let assets = Assets {
+            meshes: BTreeMap::from([("quad".to_owned(), quad)]),
+            ..Assets::default()
+        };
+        let scene = assemble(&description, assets, &Budget::of_machine())
+            .expect("builds")
+            .scene;
+        let down = -sign(behind);
+        let ray = Ray::new(Vec3::new(0.0, 0.0, -down), Vec3::new(0.0, 0.0, down));
+        let hit = scene.accelerator.intersect(ray).expect("the quad is there");
+        let surface = scene.surface::<{ Features::EVERYTHING.bits() }>(&ray, &hit);
+        let along_v = Vec3::Y;
+        let turn = surface.along_u.cross(along_v).dot(surface.normal);
+        assert_eq!(surface.right_handed, turn > 0.0, "{bits}: {surface:?}");
+        assert_eq!(surface.right_handed, !(texture ^ object ^ behind), "{bits}");
     }
 }

@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 
-use crate::bsdf::{Bsdf, within_reach};
+use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
@@ -134,23 +134,9 @@ impl Scene {
         let front = geometric.dot(ray.direction) <= 0.0;
         let geometric_normal = if front { geometric } else { -geometric };
 
-        let normal = match &mesh.normals {
-            Some(normals) if has::<F>(Features::SMOOTH_NORMALS) => {
-                let [a, b, c] = corners.map(|i| Vec3A::from(normals[i]));
-                let local = a * w + b * u + c * v;
-                let world = match object.to_world {
-                    Some(_) if has::<F>(Features::INSTANCES) => object.normal_to_world * local,
-                    _ => local,
-                };
-                let world = Vec3::from(world).try_normalize().unwrap_or(geometric);
-                let facing = if front { world } else { -world };
-                within_reach(facing, geometric_normal)
-            }
-            _ => geometric_normal,
-        };
-
         let mut uv = Vec2::ZERO;
         let mut along_u = Vec3::ZERO;
+        let mut right_handed = true;
         if has::<F>(Features::TEXTURES) || has::<F>(Features::ANISOTROPY) {
             if let Some(uvs) = &mesh.uvs {
                 let [ta, tb, tc] = corners.map(|i| Vec2::from(uvs[i]));
@@ -159,6 +145,7 @@ impl Scene {
                     let (du, dv) = (tb - ta, tc - ta);
                     let area = du.perp_dot(dv);
                     along_u = Vec3::from(((b - a) * dv.y - (c - a) * du.y) * area.signum());
+                    right_handed = ((area >= 0.0) != object.mirrored) == front;
                 }
             }
         }
@@ -173,19 +160,33 @@ impl Scene {
             .slots
             .as_ref()
             .map_or(0, |slots| slots[hit.triangle as usize] as usize);
-        Surface {
+        let surface = Surface {
             position: Vec3::from(position),
             error,
             geometric_normal,
-            normal,
+            normal: geometric_normal,
             front,
             uv,
             material: object.materials[slot],
             object: object_index,
             triangle: hit.triangle,
             along_u,
+            right_handed,
             in_box,
             normal_to_world: object.normal_to_world,
+        };
+        match &mesh.normals {
+            Some(normals) if has::<F>(Features::SMOOTH_NORMALS) => {
+                let [a, b, c] = corners.map(|i| Vec3A::from(normals[i]));
+                let local = a * w + b * u + c * v;
+                let world = match object.to_world {
+                    Some(_) if has::<F>(Features::INSTANCES) => object.normal_to_world * local,
+                    _ => local,
+                };
+                let world = Vec3::from(world).try_normalize().unwrap_or(geometric);
+                surface.with_normal(if front { world } else { -world })
+            }
+            _ => surface,
         }
     }
 

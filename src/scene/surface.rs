@@ -2,6 +2,7 @@
 
 use glam::{Mat3A, Vec2, Vec3};
 
+use crate::bsdf::within_reach;
 use crate::description::Axis;
 use crate::embree::Ray;
 
@@ -15,7 +16,8 @@ pub struct Surface {
     pub error: Vec3,
     /// The triangle's normal.
     pub geometric_normal: Vec3,
-    /// The interpolated normal, or the triangle's.
+    /// The shading normal: interpolated, the triangle's, or what a material puts in
+    /// their place; see [`Self::with_normal`].
     pub normal: Vec3,
     /// Whether the ray came from the side that the triangle's corners go round
     /// counter-clockwise: the outside.
@@ -30,6 +32,9 @@ pub struct Surface {
     pub triangle: u32,
     /// ∂position/∂u, not normalised; zero where nothing needs it.
     pub along_u: Vec3,
+    /// Whether ∂position/∂u, ∂position/∂v and the normal are right-handed: not so
+    /// where the texture is mirrored, or seen from behind. True where nothing needs it.
+    pub right_handed: bool,
     /// The hit in the box of the object's mesh, each side from −½ to ½; zero
     /// where nothing needs it.
     pub in_box: Vec3,
@@ -79,8 +84,19 @@ impl Surface {
             object: 0,
             triangle: 0,
             along_u: Vec3::X,
+            right_handed: from_above,
             in_box: Vec3::X,
             normal_to_world: Mat3A::IDENTITY,
+        }
+    }
+
+    /// The same point with another shading normal (unit length, on the viewer's side),
+    /// tilted towards the triangle's if it is too far off to shade with.
+    #[must_use]
+    pub fn with_normal(self, normal: Vec3) -> Self {
+        Self {
+            normal: within_reach(normal, self.geometric_normal),
+            ..self
         }
     }
 
