@@ -77,7 +77,7 @@ impl Horizons {
     /// From a closure's direction to the true one, T; on the same side of the true
     /// surface as `wi` is of the shading plane, up to rounding.
     #[inline(always)]
-    pub fn to_true(&self, wi: Vec3) -> Moved {
+    pub fn lift(&self, wi: Vec3) -> Moved {
         let side = 1f32.copysign(wi.dot(self.shading));
         let up = wi * side;
         if !self.is_near(up.dot(self.shading), up.dot(self.geometric)) {
@@ -90,7 +90,7 @@ impl Horizons {
     /// From a true direction to the closure's, T⁻¹; `None` where the closure sends
     /// nothing: below its horizon and above the true one.
     #[inline(always)]
-    pub fn to_closure(&self, wi: Vec3) -> Option<Moved> {
+    pub fn lower(&self, wi: Vec3) -> Option<Moved> {
         let side = 1f32.copysign(wi.dot(self.geometric));
         let up = wi * side;
         let cos = up.dot(self.shading);
@@ -115,7 +115,7 @@ impl Horizons {
         } else {
             wo
         };
-        self.to_closure(wo).map_or(wo, |(wo, _)| wo)
+        self.lower(wo).map_or(wo, |(wo, _)| wo)
     }
 
     /// Whether a direction above the shading plane has ψ < S, from its cosines with
@@ -229,11 +229,11 @@ mod tests {
             for _ in 0..2000 {
                 let horizons = tilted(tilt, &mut rng);
                 let wi = direction(&mut rng);
-                let (moved, density) = horizons.to_true(wi);
+                let (moved, density) = horizons.lift(wi);
                 let sides = wi.dot(horizons.shading) * moved.dot(horizons.geometric);
                 assert!(sides > -1e-6, "{tilt}: {wi} and {moved}");
                 assert!((moved.length() - 1.0).abs() < 1e-5);
-                let Some((back, again)) = horizons.to_closure(moved) else {
+                let Some((back, again)) = horizons.lower(moved) else {
                     panic!("{tilt}: {wi} has no way back from {moved}");
                 };
                 assert!((back - wi).length() < 2e-4, "{tilt}: {wi} came back {back}");
@@ -254,7 +254,7 @@ mod tests {
                 let horizons = tilted(tilt, &mut rng);
                 let wi = direction(&mut rng);
                 let up = wi.dot(horizons.geometric) > 0.0;
-                let moved = horizons.to_closure(wi).filter(|_| up);
+                let moved = horizons.lower(wi).filter(|_| up);
                 // Lambert's lobe about the shading normal.
                 let value = moved.map_or(0.0, |(back, density)| {
                     4.0 * f64::from(back.dot(horizons.shading) * density)
@@ -276,11 +276,11 @@ mod tests {
             let n = direction(&mut rng);
             let wi = direction(&mut rng);
             let flat = Horizons::new(n, n);
-            assert_eq!(flat.to_true(wi), (wi, 1.0));
-            assert_eq!(flat.to_closure(wi), Some((wi, 1.0)));
+            assert_eq!(flat.lift(wi), (wi, 1.0));
+            assert_eq!(flat.lower(wi), Some((wi, 1.0)));
             let smooth = tilted(0.2, &mut rng);
             let up = smooth.shading;
-            assert_eq!(smooth.to_true(up), (up, 1.0), "0.2 rad is far from π/2");
+            assert_eq!(smooth.lift(up), (up, 1.0), "0.2 rad is far from π/2");
         }
     }
 

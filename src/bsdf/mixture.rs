@@ -105,7 +105,7 @@ impl<const F: u32> Bsdf<F> {
         let horizons = part.horizons(self.normal);
         let wo = part.frame.to_local(horizons.viewer(wo));
         let sample = part.closure.sample(wo, rng)?;
-        let (wi, _) = horizons.to_true(part.frame.to_world(sample.wi));
+        let (wi, _) = horizons.lift(part.frame.to_world(sample.wi));
         if !same_side(self.normal, wi, sample.wi.z) {
             return None;
         }
@@ -237,7 +237,7 @@ impl WeightedClosure {
     #[inline(always)]
     fn see(&self, geometric: Vec3, wo: Vec3, wi: Vec3) -> Option<Seen> {
         let horizons = self.horizons(geometric);
-        let (moved, density) = horizons.to_closure(wi)?;
+        let (moved, density) = horizons.lower(wi)?;
         let local = self.frame.to_local(moved);
         same_side(geometric, wi, local.z).then(|| Seen {
             wo: self.frame.to_local(horizons.viewer(wo)),
@@ -282,7 +282,7 @@ impl<const F: u32> InLanes<'_, F> {
         };
         exits.map(|exit| {
             let (sample, pdf) = exit.filter(|(sample, _)| sample.is_usable())?;
-            let (wi, density) = horizons.to_true(self.part.frame.to_world(sample.wi));
+            let (wi, density) = horizons.lift(self.part.frame.to_world(sample.wi));
             let lit = same_side(self.normal, wi, sample.wi.z);
             let sample = ScatterSample {
                 wi,
@@ -313,7 +313,7 @@ impl<const F: u32> InLanes<'_, F> {
         let mut local = [Vec3::NEG_Z; LANES];
         for (i, &wi) in wi.iter().enumerate() {
             // No light comes from below a metal.
-            let Some((moved, density)) = horizons.to_closure(wi) else {
+            let Some((moved, density)) = horizons.lower(wi) else {
                 continue;
             };
             let moved = self.part.frame.to_local(moved);

@@ -96,9 +96,11 @@ pub fn render_furnace(
     })
 }
 
+type Shape = (&'static str, fn() -> Mesh);
+
 /// The shapes that stand in the furnace. Smooth normals differ from the triangles' by up
 /// to 18° on the coarse sphere and 4° on the fine one.
-const SHAPES: [(&str, fn() -> Mesh); 4] = [
+const SHAPES: [Shape; 4] = [
     ("plane", plane),
     ("flat 48x24", || sphere(48, 24, false)),
     ("smooth 64x32", || sphere(64, 32, true)),
