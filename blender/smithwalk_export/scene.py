@@ -337,6 +337,7 @@ class Job:
                 self.log.note(where, "has no extent (scale 0): left out")
                 return None
             transform = matrix  # a flattened object: its scale goes into the vertices
+            self.log.warn(where, "its scale flattens it: its faces are shaded flat, not smooth")
         slots = _used_slots(ob.data)
         materials = [self._slot_material(ob, i, depsgraph) for i in slots]
         needs = self._object_needs(ob, materials)
