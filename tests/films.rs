@@ -237,17 +237,17 @@ fn resume_refuses_what_changes_samples_and_nothing_else() {
 /// over the first half second, `signal` as `kill` names it.
 fn killed(name: &str, kills: u32, signal: &str) {
     let room = Room::new(name);
-    let spp = "256";
-    room.render(&["-o", "whole.exr", "--spp", spp]);
-    let more = [
-        "-o",
-        "a.exr",
-        "--resume",
+    let size = [
+        "-D",
+        "film.width=20",
+        "-D",
+        "film.height=14",
         "--spp",
-        spp,
-        "--checkpoint",
-        "0.02",
+        "256",
     ];
+    room.render(&[&["-o", "whole.exr"][..], &size].concat());
+    let more = ["-o", "a.exr", "--resume", "--checkpoint", "0.02"];
+    let more = [&more[..], &size].concat();
     for kill in 0..kills {
         let mut child = room.command(&more);
         let mut child = child
@@ -309,7 +309,7 @@ fn a_terminated_render_is_saved_and_goes_on() {
         assert_eq!(code, Some(143));
         assert!(Path::new(&room.file("a.exr")).exists());
         let done = json(&["film", &room.file("a.exr.film"), "--json"]);
-        let spp = done["spp"].as_u64().unwrap().max(1) + 40;
+        let spp = done["spp"].as_u64().unwrap().max(1) + 8;
         let spp = spp.to_string();
         let output = room.render(&["-o", "a.exr", "--resume", "--spp", &spp]);
         assert!(String::from_utf8_lossy(&output.stderr).contains("resuming"));
