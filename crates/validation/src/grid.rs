@@ -1,7 +1,7 @@
 //! The configurations that are checked.
 
 use super::model::Distribution;
-use smithwalk_model::{Beckmann, Ggx, Vector3};
+use smithwalk_model::Vector3;
 
 /// How much is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +39,7 @@ impl Effort {
         );
         let mut all = vec![Distribution::Quadratic];
         for &(alpha_x, alpha_y) in alphas {
-            all.push(Distribution::Ggx(Ggx { alpha_x, alpha_y }));
-            all.push(Distribution::Beckmann(Beckmann { alpha_x, alpha_y }));
+            all.extend(Distribution::of_roughness(alpha_x, alpha_y));
         }
         all
     }

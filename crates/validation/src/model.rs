@@ -33,6 +33,14 @@ pub enum Distribution {
 }
 
 impl Distribution {
+    /// Those that have a roughness, of this one: slope roughness α along x and y.
+    pub fn of_roughness(alpha_x: f64, alpha_y: f64) -> impl IntoIterator<Item = Self> {
+        [
+            Self::Ggx(Ggx { alpha_x, alpha_y }),
+            Self::Beckmann(Beckmann { alpha_x, alpha_y }),
+        ]
+    }
+
     /// The slope roughness α along x and y; that of slopes ∼ 1 for the
     /// quadratic distribution.
     pub fn alpha(self) -> (f64, f64) {
