@@ -53,7 +53,9 @@ impl<const F: u32> PathTracer<'_, F> {
         };
 
         let mut result = PathResult {
-            first: self.describe_first.then(|| self.describe(&trunk, &surface)),
+            first: self
+                .describe_first
+                .then(|| FirstHit::of(self.scene, &trunk, &surface)),
             ..PathResult::of(found)
         };
         if has::<F>(Features::LIGHT_SAMPLING) {
@@ -212,14 +214,5 @@ impl<const F: u32> PathTracer<'_, F> {
         }
         path.throughput /= survival;
         true
-    }
-
-    /// What AOVs say of the first surface that a camera ray meets.
-    fn describe(&self, path: &Path, surface: &Surface) -> FirstHit {
-        FirstHit {
-            albedo: self.scene.albedo(surface, path.view()),
-            normal: surface.normal,
-            distance: path.last.travelled + path.to_surface,
-        }
     }
 }

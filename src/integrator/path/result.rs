@@ -8,6 +8,9 @@ use crate::bsdf::ByOrder;
 use crate::color::Rgb;
 use crate::film::{Aov, Sample};
 use crate::integrator::split::Spread;
+use crate::scene::{Scene, Surface};
+
+use super::state::Path;
 
 /// Into what a camera path splits at the first surface that scatters it: each
 /// draws the numbers of an index of its own from the pixel's
@@ -53,6 +56,17 @@ pub struct FirstHit {
     pub normal: Vec3,
     /// Distance along the camera ray, metres.
     pub distance: f32,
+}
+
+impl FirstHit {
+    /// At the surface that the camera path has met.
+    pub(super) fn of(scene: &Scene, path: &Path, surface: &Surface) -> Self {
+        Self {
+            albedo: scene.albedo(surface, path.view()),
+            normal: surface.normal,
+            distance: path.last.travelled + path.to_surface,
+        }
+    }
 }
 
 impl PathResult {
