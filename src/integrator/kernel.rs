@@ -6,8 +6,8 @@ use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 use super::pass::{Integrator, Job, pilots, samples};
-use super::path::{PathResult, PathTracer, Split};
-use super::split::{Cells, Pilot};
+use super::path::{PathResult, PathTracer};
+use super::split::{Cells, Pilot, Split};
 use crate::embree::Ray;
 
 /// Lambertian surfaces under a constant world, or shining themselves: nothing

@@ -7,6 +7,6 @@ mod render;
 mod split;
 
 pub use kernel::{KERNELS, kernel_for};
-pub use path::{FirstHit, PathResult, PathTracer, Split};
+pub use path::{FirstHit, PathResult, PathTracer};
 pub use render::{Checkpoint, Control, Progress, RenderError, RenderReport, Stop, render};
-pub use split::Spread;
+pub use split::{Split, Spread};

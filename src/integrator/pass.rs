@@ -3,8 +3,8 @@
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
-use super::path::{PathResult, Split};
-use super::split::{CELL, Cells, Draws, Pilot, Plan};
+use super::path::PathResult;
+use super::split::{CELL, Cells, Draws, Pilot, Plan, Split};
 use crate::camera::Camera;
 use crate::embree::Ray;
 use crate::features::Features;

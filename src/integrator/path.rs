@@ -11,7 +11,7 @@ mod result;
 mod state;
 mod tracer;
 
-pub use result::{FirstHit, PathResult, Split};
+pub use result::{FirstHit, PathResult};
 pub use tracer::PathTracer;
 
 use std::ops::Range;
@@ -20,7 +20,7 @@ use crate::bsdf::{Bsdf, ScatterSample};
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
-use crate::integrator::split::Spread;
+use crate::integrator::split::{Split, Spread};
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::Surface;
 

@@ -1,7 +1,5 @@
 //! What a camera path is asked for, and what it finds.
 
-use std::ops::Range;
-
 use glam::Vec3;
 
 use crate::bsdf::ByOrder;
@@ -11,17 +9,6 @@ use crate::integrator::split::Spread;
 use crate::scene::{Scene, Surface};
 
 use super::state::Path;
-
-/// Into what a camera path splits at the first surface that scatters it: each
-/// draws the numbers of an index of its own from the pixel's
-/// [`crate::sampler::Sampler`].
-#[derive(Clone, Debug)]
-pub struct Split {
-    /// Ways in which it goes on.
-    pub branches: Range<u32>,
-    /// Samples of the light that arrives there directly.
-    pub light_samples: Range<u32>,
-}
 
 /// The light that a part of a path found, and what that took.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,6 +1,6 @@
 //! From pilots to numbers of draws.
 
-use super::Draws;
+use super::draws::Draws;
 use super::pilot::{Cells, Pilot, Spread};
 use crate::metrics::REL_EPSILON;
 

@@ -11,47 +11,19 @@
 //! what it was decided by, it adds no bias.
 
 mod allocate;
+mod draws;
 mod pilot;
 mod schedule;
 
+pub use draws::Split;
 pub use pilot::Spread;
 
+pub(super) use draws::Draws;
 pub(super) use pilot::{CELL, Cells, Pilot};
 pub(super) use schedule::pass_length;
 
 use crate::image::Window;
 use crate::scene::RenderSettings;
-
-/// Of what a sample of a pixel is the mean: paths from the camera, each of which
-/// splits at the first surface that scatters it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Draws {
-    /// Paths that start at the camera, each somewhere else in the pixel.
-    pub camera_rays: u32,
-    /// Light samples where one of them is scattered first.
-    pub light_samples: u32,
-    /// Branches: BSDF samples by which one of them goes on from there.
-    pub branches: u32,
-}
-
-impl Draws {
-    /// No more than this many of each.
-    pub const MOST: u32 = 64;
-
-    /// A plain path.
-    pub const ONE: Self = Self {
-        camera_rays: 1,
-        light_samples: 1,
-        branches: 1,
-    };
-
-    /// A path that splits just often enough to tell how much that matters.
-    pub(super) const PILOT: Self = Self {
-        camera_rays: 1,
-        light_samples: 2,
-        branches: 2,
-    };
-}
 
 /// The draws of every pixel of a window.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

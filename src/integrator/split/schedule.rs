@@ -1,27 +1,12 @@
-//! The numbers of draws, and how many samples a pass takes.
+//! How many samples a pass takes.
 
 use std::time::Duration;
-
-use super::Draws;
-use crate::integrator::path::Split;
 
 /// Between two looks at the clock, at most this share of the time limit.
 const TIME_SLICE: f64 = 0.05;
 
 /// Samples per pixel of a pass at most.
 const LONGEST_PASS: u32 = 64;
-
-impl Draws {
-    /// How camera path number `path` of a pixel splits. The draws of a pixel are
-    /// numbered on through its paths, so that they are points of one sequence.
-    pub(in super::super) fn split(self, path: u32) -> Split {
-        let numbers = |count: u32| path * count..(path + 1) * count;
-        Split {
-            light_samples: numbers(self.light_samples),
-            branches: numbers(self.branches),
-        }
-    }
-}
 
 /// Samples per pixel of the next pass: doubling from one, so that early noise figures
 /// are cheap and late passes are long enough to keep threads busy.
@@ -44,23 +29,6 @@ pub(in super::super) fn pass_length(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Consecutive paths take consecutive numbers, whatever part they belong to.
-    #[test]
-    fn draws_are_numbered_without_gaps() {
-        let draws = Draws {
-            camera_rays: 2,
-            light_samples: 3,
-            branches: 5,
-        };
-        for path in 0..10 {
-            let (split, next) = (draws.split(path), draws.split(path + 1));
-            assert_eq!(split.light_samples.len(), 3);
-            assert_eq!(split.light_samples.end, next.light_samples.start);
-            assert_eq!(split.branches.end, next.branches.start);
-        }
-        assert_eq!(draws.split(0).branches, 0..5);
-    }
 
     #[test]
     fn passes_double_and_keep_to_the_time() {
