@@ -4,6 +4,7 @@
 //! `smithwalk/__init__.py`.
 
 mod measure;
+mod scatter;
 mod surface;
 
 use pyo3::prelude::*;

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use smithwalk_model::{Estimator, PerOrder, Rgb, Stream, Vector3};
 
-use crate::surface::{Method, Rng, Surface};
+use crate::scatter::{Method, Rng, Sides};
 
 /// Samples of one batch: enough to pay for its generator, few enough to share
 /// one point among all cores.
@@ -110,7 +110,7 @@ fn total(batches: &[Moments]) -> Moments {
 
 /// f(ω_i, ω_o) |cosθ_o|, sr⁻¹, of each pair.
 pub fn eval(
-    surface: &Surface,
+    surface: &Sides,
     method: Method,
     wi: &[Vector3<f64>],
     wo: &[Vector3<f64>],
@@ -137,7 +137,7 @@ pub fn eval(
 
 /// The same, order by order; the last element has all orders from there on.
 pub fn eval_orders(
-    surface: &Surface,
+    surface: &Sides,
     estimator: Estimator,
     wi: &[Vector3<f64>],
     wo: &[Vector3<f64>],
@@ -187,7 +187,7 @@ pub struct Sample {
     pub order: u32,
 }
 
-fn walk(surface: &Surface, wi: Vector3<f64>, rng: &mut Rng) -> Sample {
+fn walk(surface: &Sides, wi: Vector3<f64>, rng: &mut Rng) -> Sample {
     let Some((side, below)) = surface.seen_from(wi) else {
         return Sample::default();
     };
@@ -206,7 +206,7 @@ fn walk(surface: &Surface, wi: Vector3<f64>, rng: &mut Rng) -> Sample {
 }
 
 /// One walk from each direction.
-pub fn sample(surface: &Surface, wi: &[Vector3<f64>], seed: u64) -> Vec<Sample> {
+pub fn sample(surface: &Sides, wi: &[Vector3<f64>], seed: u64) -> Vec<Sample> {
     wi.par_iter()
         .enumerate()
         .map(|(point, &wi)| walk(surface, wi, &mut generator(seed, point, 0)))
@@ -214,7 +214,7 @@ pub fn sample(surface: &Surface, wi: &[Vector3<f64>], seed: u64) -> Vec<Sample> 
 }
 
 /// The proxy density of each pair, sr⁻¹.
-pub fn pdf(surface: &Surface, wi: &[Vector3<f64>], wo: &[Vector3<f64>]) -> Vec<f64> {
+pub fn pdf(surface: &Sides, wi: &[Vector3<f64>], wo: &[Vector3<f64>]) -> Vec<f64> {
     wi.par_iter()
         .zip(wo)
         .map(|(&wi, &wo)| match surface.seen_from(wi) {
@@ -239,7 +239,7 @@ pub struct Albedo {
 
 /// Directional albedos, by `samples` walks from each direction.
 pub fn albedo(
-    surface: &Surface,
+    surface: &Sides,
     wi: &[Vector3<f64>],
     orders: usize,
     samples: u64,
@@ -299,7 +299,7 @@ pub fn albedo(
 /// bins of equal solid angle over the whole sphere, divided by that solid
 /// angle: the mean of f |cosθ_o| over the bin, sr⁻¹.
 pub fn lobe(
-    surface: &Surface,
+    surface: &Sides,
     wi: Vector3<f64>,
     bins: [usize; 2],
     samples: u64,

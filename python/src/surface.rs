@@ -4,128 +4,34 @@ use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rand_pcg::Pcg64Mcg;
 use smithwalk_model::{
-    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Exit, Facets, Ggx,
-    Microsurface, Ndf, PerOrder, Quadratic, Rgb, Stream, Total, Vector3,
+    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Facets, Ggx, Quadratic,
+    Rgb, Vector3,
 };
 
 use crate::measure::{self, Albedo};
-
-/// The generator that each point has one of.
-pub type Rng = Stream<Pcg64Mcg>;
-
-/// How f is estimated.
-#[derive(Clone, Copy)]
-pub enum Method {
-    /// All orders.
-    Orders(Estimator),
-    /// The first order alone.
-    Single,
-}
-
-/// A microsurface seen from above, of whichever distribution and facets.
-pub trait Scatter: Send + Sync {
-    /// One estimate of f |cosθ_o|, sr⁻¹, all orders together.
-    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64>;
-    /// The same, order by order, added to `orders`.
-    fn eval_orders(
-        &self,
-        estimator: Estimator,
-        wi: Vector3<f64>,
-        wo: Vector3<f64>,
-        rng: &mut Rng,
-        orders: &mut PerOrder<f64>,
-    );
-    /// One walk.
-    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>>;
-    /// The proxy density, sr⁻¹.
-    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64;
-}
-
-impl<N, I> Scatter for Microsurface<N, I>
-where
-    N: Ndf<Scalar = f64> + Send + Sync,
-    I: Facets<Scalar = f64> + Send + Sync,
-{
-    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64> {
-        match method {
-            Method::Single => self.eval_single(wi, wo, rng),
-            Method::Orders(estimator) => {
-                let mut total = Total::default();
-                Microsurface::eval(self, estimator, wi, wo, rng, &mut total);
-                total.0
-            }
-        }
-    }
-
-    fn eval_orders(
-        &self,
-        estimator: Estimator,
-        wi: Vector3<f64>,
-        wo: Vector3<f64>,
-        rng: &mut Rng,
-        orders: &mut PerOrder<f64>,
-    ) {
-        Microsurface::eval(self, estimator, wi, wo, rng, orders);
-    }
-
-    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>> {
-        Microsurface::sample(self, wi, rng)
-    }
-
-    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
-        Microsurface::pdf(self, wi, wo)
-    }
-}
+use crate::scatter::{Method, Sides};
 
 /// A rough surface.
 #[pyclass(frozen)]
-pub struct Surface {
-    above: Box<dyn Scatter>,
-    /// Seen from the other side; absent where nothing comes through.
-    below: Option<Box<dyn Scatter>>,
-}
+pub struct Surface(Sides);
 
-impl Surface {
-    /// The surface as `wi` sees it, and whether that is from below: then z is
-    /// mirrored. Light on the opaque side meets nothing.
-    pub fn seen_from(&self, wi: Vector3<f64>) -> Option<(&dyn Scatter, bool)> {
-        if wi.z > 0.0 {
-            Some((&*self.above, false))
-        } else {
-            self.below.as_deref().map(|below| (below, true))
-        }
-    }
-
-    fn with<I>(distribution: &str, alpha: [f64; 2], facets: I) -> PyResult<Self>
-    where
-        I: Facets<Scalar = f64> + Send + Sync + 'static,
-    {
-        let [alpha_x, alpha_y] = alpha;
-        match distribution {
-            "ggx" => Ok(Self::of(Ggx { alpha_x, alpha_y }, facets)),
-            "beckmann" => Ok(Self::of(Beckmann { alpha_x, alpha_y }, facets)),
-            "quadratic" => Ok(Self::of(Quadratic::new(), facets)),
-            other => Err(PyValueError::new_err(format!(
+fn with<I>(distribution: &str, alpha: [f64; 2], facets: I) -> PyResult<Surface>
+where
+    I: Facets<Scalar = f64> + Send + Sync + 'static,
+{
+    let [alpha_x, alpha_y] = alpha;
+    let sides = match distribution {
+        "ggx" => Sides::of(Ggx { alpha_x, alpha_y }, facets),
+        "beckmann" => Sides::of(Beckmann { alpha_x, alpha_y }, facets),
+        "quadratic" => Sides::of(Quadratic::new(), facets),
+        other => {
+            return Err(PyValueError::new_err(format!(
                 "distribution: expected 'ggx', 'beckmann' or 'quadratic', found {other:?}"
-            ))),
+            )));
         }
-    }
-
-    fn of<N, I>(ndf: N, facets: I) -> Self
-    where
-        N: Ndf<Scalar = f64> + Send + Sync + 'static,
-        I: Facets<Scalar = f64> + Send + Sync + 'static,
-    {
-        Self {
-            above: Box::new(Microsurface { ndf, facets }),
-            below: I::TRANSMITS.then(|| {
-                let facets = facets.inverted();
-                Box::new(Microsurface { ndf, facets }) as Box<dyn Scatter>
-            }),
-        }
-    }
+    };
+    Ok(Surface(sides))
 }
 
 fn method(name: &str) -> PyResult<Method> {
@@ -173,7 +79,7 @@ impl Surface {
     #[staticmethod]
     fn conductor_color(distribution: &str, alpha: [f64; 2], color: [f64; 3]) -> PyResult<Self> {
         let fresnel = ConductorFresnel::Constant(Rgb(color));
-        Self::with(distribution, alpha, Conductor { fresnel })
+        with(distribution, alpha, Conductor { fresnel })
     }
 
     #[staticmethod]
@@ -187,19 +93,19 @@ impl Surface {
             eta: Rgb(eta),
             k: Rgb(k),
         };
-        Self::with(distribution, alpha, Conductor { fresnel })
+        with(distribution, alpha, Conductor { fresnel })
     }
 
     #[staticmethod]
     fn dielectric(distribution: &str, alpha: [f64; 2], eta: f64, tint: [f64; 3]) -> PyResult<Self> {
         let tint = Rgb(tint);
-        Self::with(distribution, alpha, Dielectric { eta, tint })
+        with(distribution, alpha, Dielectric { eta, tint })
     }
 
     #[staticmethod]
     fn diffuse(distribution: &str, alpha: [f64; 2], albedo: [f64; 3]) -> PyResult<Self> {
         let albedo = Rgb(albedo);
-        Self::with(distribution, alpha, Diffuse { albedo })
+        with(distribution, alpha, Diffuse { albedo })
     }
 
     fn eval<'py>(
@@ -213,7 +119,7 @@ impl Surface {
     ) -> PyResult<Columns<'py>> {
         let method = method(estimator)?;
         let (wi, wo) = (vectors(&wi), vectors(&wo));
-        let found = py.detach(|| measure::eval(self, method, &wi, &wo, samples, seed));
+        let found = py.detach(|| measure::eval(&self.0, method, &wi, &wo, samples, seed));
         Ok(columns(py, found))
     }
 
@@ -235,7 +141,7 @@ impl Surface {
         };
         let (wi, wo) = (vectors(&wi), vectors(&wo));
         let found =
-            py.detach(|| measure::eval_orders(self, estimator, &wi, &wo, orders, samples, seed));
+            py.detach(|| measure::eval_orders(&self.0, estimator, &wi, &wo, orders, samples, seed));
         let array = |value: fn(&measure::Estimate) -> [f64; 3]| {
             let flat: Vec<f64> = found.iter().flatten().flat_map(value).collect();
             let blocks = Array3::from_shape_vec((wi.len(), orders, 3), flat);
@@ -251,7 +157,7 @@ impl Surface {
         seed: u64,
     ) -> Samples<'py> {
         let wi = vectors(&wi);
-        let found = py.detach(|| measure::sample(self, &wi, seed));
+        let found = py.detach(|| measure::sample(&self.0, &wi, seed));
         let rows = |value: fn(&measure::Sample) -> [f64; 3]| {
             let flat: Vec<f64> = found.iter().flat_map(value).collect();
             let rows = Array2::from_shape_vec((found.len(), 3), flat);
@@ -272,7 +178,7 @@ impl Surface {
         wo: PyReadonlyArray2<'py, f64>,
     ) -> Bound<'py, PyArray1<f64>> {
         let (wi, wo) = (vectors(&wi), vectors(&wo));
-        let found = py.detach(|| measure::pdf(self, &wi, &wo));
+        let found = py.detach(|| measure::pdf(&self.0, &wi, &wo));
         Array1::from_vec(found).into_pyarray(py)
     }
 
@@ -293,7 +199,7 @@ impl Surface {
         Bound<'py, PyArray1<f64>>,
     ) {
         let wi = vectors(&wi);
-        let found = py.detach(|| measure::albedo(self, &wi, orders, samples, seed));
+        let found = py.detach(|| measure::albedo(&self.0, &wi, orders, samples, seed));
         let side =
             |side: fn(&Albedo) -> measure::Estimate| columns(py, found.iter().map(side).collect());
         let shares: Vec<f64> = found.iter().flat_map(|a| a.orders.clone()).collect();
@@ -318,7 +224,7 @@ impl Surface {
         seed: u64,
     ) -> Columns<'py> {
         let wi = Vector3::new(wi[0], wi[1], wi[2]);
-        let found = py.detach(|| measure::lobe(self, wi, bins, samples, seed));
+        let found = py.detach(|| measure::lobe(&self.0, wi, bins, samples, seed));
         columns(py, found)
     }
 }

@@ -13,6 +13,7 @@ mod overrides;
 mod principled;
 mod problem;
 mod read;
+mod rough;
 mod settings;
 mod transform;
 mod validate;
@@ -24,12 +25,12 @@ pub use camera::{
 };
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
-    Axis, Colored, Conductor, Dielectric, Diffuse, Distribution, Emission, Factor, Material,
-    MaterialRef, Metal, Mix, Reflectance, Rough, RoughDiffuse, Roughness, Scattering, Sheen, Sum,
-    Tangent, Velvet,
+    Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,
+    Reflectance, RoughDiffuse, Sheen, Sum, Velvet,
 };
 pub use principled::{Principled, Principled3, Principled4, Sockets, Version};
 pub use problem::{Problem, Problems};
+pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
 pub use value::{Color, Scalar};

@@ -1,6 +1,6 @@
 //! Blender's Principled BSDF, by the sockets of its node.
 
-use super::material::Tangent;
+use super::rough::Tangent;
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
 use crate::texture::Channel;

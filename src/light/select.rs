@@ -1,7 +1,7 @@
 //! Which light to sample.
 
 use super::Receiver;
-use super::tree::{Extent, LEAST_FACING, Tree, Weights};
+use super::tree::{Extent, LEAST_FACING, MOST, Tree, Weights};
 use super::warp::BELOW_ONE;
 use glam::Vec3;
 
@@ -197,9 +197,6 @@ impl Chooser {
         }
     }
 }
-
-/// No estimate is above this, so that sums stay finite.
-pub(super) const MOST: f32 = 1e30;
 
 /// The least estimate of a light that reaches the point, as a share of the
 /// largest one: another light's may be in shadow, and a sum in f32 must not

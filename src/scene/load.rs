@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::compile::Materials;
-use super::resolve::ResolveError;
+use super::error::ResolveError;
 use crate::description::{Assignment, Description, Object, World};
 use crate::memory::Budget;
 use crate::mesh::{Mesh, Wanted};

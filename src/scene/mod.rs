@@ -2,6 +2,7 @@
 //! quantities for the file's units, nothing that no ray asks for.
 
 mod compile;
+mod error;
 mod identity;
 mod load;
 mod material;
@@ -11,12 +12,13 @@ mod surface;
 mod transform;
 
 pub use compile::{Compiled, MaterialError, Materials, Needs, compile_alone};
+pub use error::ResolveError;
 pub use load::Assets;
 pub use material::{
     Facet, Factor, Leaf, Material, Number, Point, Reflectance, RoughMaterial, Roughness, Tangent,
     Tint, WeightedLeaf, blender_alphas,
 };
-pub use resolve::{ResolveError, Resolved, assemble, resolve, resolve_within};
+pub use resolve::{Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
 pub use surface::{Surface, View};
 pub use transform::{euler, to_affine};

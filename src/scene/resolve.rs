@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::compile::Materials;
+use super::error::ResolveError;
 use super::identity::identity;
 use super::load::Assets;
 use super::transform::to_affine;
@@ -20,21 +21,6 @@ use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolv
 use crate::memory::Budget;
 use crate::mesh::Mesh;
 use crate::texture::Texture;
-
-/// Everything that keeps a scene from being rendered, a line or more each.
-#[derive(Debug, PartialEq, Eq)]
-pub struct ResolveError {
-    /// For people.
-    pub problems: Vec<String>,
-}
-
-impl std::fmt::Display for ResolveError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.problems.join("\n"))
-    }
-}
-
-impl std::error::Error for ResolveError {}
 
 /// A scene, and what was mended to get it.
 #[derive(Debug)]

@@ -14,10 +14,12 @@ mod cone;
 pub(super) use cone::Cone;
 
 use super::Receiver;
-use super::select::MOST;
 use crate::embree::Ray;
 use glam::Vec3;
 use wide::{CmpGe, CmpGt, CmpLe, f32x8};
+
+/// No estimate is above this, so that sums stay finite.
+pub(super) const MOST: f32 = 1e30;
 
 /// Children of a node.
 const WIDTH: usize = 8;

@@ -3,7 +3,8 @@
 use smallvec::SmallVec;
 use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
-use super::math::{Directions, phase, reflectance};
+use super::math::{Directions, reflectance};
+use super::ndf::phase;
 use super::ndf::{NdfInLanes, NdfLanes};
 use super::rotated::Rotated;
 use super::{LANES, survivors};

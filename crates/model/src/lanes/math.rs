@@ -1,9 +1,8 @@
-//! Directions, the phase function of mirrors and Fresnel's reflectance for one direction
+//! Directions and Fresnel's reflectance for one direction
 //! in each lane: the formulas of [`crate::fresnel`], with masks for branches.
 
-use wide::{CmpEq, CmpGe, CmpGt, f32x8};
+use wide::{CmpGe, CmpGt, f32x8};
 
-use super::ndf::NdfLanes;
 use crate::{ConductorFresnel, Rgb, Vector3};
 
 /// A direction in each lane.
@@ -79,22 +78,6 @@ impl Directions {
         let length = f32x8::from(1.5) - f32x8::from(0.5) * d.dot(d);
         (d.scaled(length), cos)
     }
-}
-
-/// The density of the phase function of mirrors from `w`, with `sigma` = σ(w),
-/// towards `o`, sr⁻¹; and |w + o|, twice the cosine at the facet.
-#[inline(always)]
-pub(super) fn phase(
-    ndf: &impl NdfLanes,
-    w: Directions,
-    sigma: f32x8,
-    o: Directions,
-) -> (f32x8, f32x8) {
-    let h = w.plus(o);
-    let length = h.dot(h).sqrt();
-    let density = ndf.density(h) / (f32x8::from(4.0) * sigma);
-    let none = length.cmp_eq(f32x8::ZERO) | sigma.cmp_eq(f32x8::ZERO);
-    (none.blend(f32x8::ZERO, density), length)
 }
 
 /// The reflectance at these cosines of incidence, per channel.

@@ -1,6 +1,6 @@
 //! What lanes need of a distribution of normals, and GGX.
 
-use wide::{CmpGe, CmpGt, f32x8};
+use wide::{CmpEq, CmpGe, CmpGt, f32x8};
 
 use super::math::Directions;
 use crate::{Ggx, Ndf};
@@ -104,4 +104,20 @@ impl NdfLanes for GgxLanes {
             z: known.blend(m.z / length, f32x8::ZERO),
         }
     }
+}
+
+/// The density of the phase function of mirrors from `w`, with `sigma` = σ(w),
+/// towards `o`, sr⁻¹; and |w + o|, twice the cosine at the facet.
+#[inline(always)]
+pub(super) fn phase(
+    ndf: &impl NdfLanes,
+    w: Directions,
+    sigma: f32x8,
+    o: Directions,
+) -> (f32x8, f32x8) {
+    let h = w.plus(o);
+    let length = h.dot(h).sqrt();
+    let density = ndf.density(h) / (f32x8::from(4.0) * sigma);
+    let none = length.cmp_eq(f32x8::ZERO) | sigma.cmp_eq(f32x8::ZERO);
+    (none.blend(f32x8::ZERO, density), length)
 }

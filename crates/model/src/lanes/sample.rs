@@ -2,7 +2,8 @@
 
 use wide::{CmpGe, CmpGt, CmpLt, f32x8};
 
-use super::math::{Directions, phase, reflectance};
+use super::math::{Directions, reflectance};
+use super::ndf::phase;
 use super::ndf::{NdfInLanes, NdfLanes};
 use super::{LANES, survivors};
 use crate::walk::Roulette;

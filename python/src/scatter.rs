@@ -1,0 +1,106 @@
+//! What is measured: a microsurface of whichever distribution and facets.
+
+use rand_pcg::Pcg64Mcg;
+use smithwalk_model::{
+    Estimator, Exit, Facets, Microsurface, Ndf, PerOrder, Rgb, Stream, Total, Vector3,
+};
+
+/// The generator that each point has one of.
+pub type Rng = Stream<Pcg64Mcg>;
+
+/// How f is estimated.
+#[derive(Clone, Copy)]
+pub enum Method {
+    /// All orders.
+    Orders(Estimator),
+    /// The first order alone.
+    Single,
+}
+
+/// A microsurface seen from above, of whichever distribution and facets.
+pub trait Scatter: Send + Sync {
+    /// One estimate of f |cosθ_o|, sr⁻¹, all orders together.
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64>;
+    /// The same, order by order, added to `orders`.
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    );
+    /// One walk.
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>>;
+    /// The proxy density, sr⁻¹.
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64;
+}
+
+impl<N, I> Scatter for Microsurface<N, I>
+where
+    N: Ndf<Scalar = f64> + Send + Sync,
+    I: Facets<Scalar = f64> + Send + Sync,
+{
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64> {
+        match method {
+            Method::Single => self.eval_single(wi, wo, rng),
+            Method::Orders(estimator) => {
+                let mut total = Total::default();
+                Microsurface::eval(self, estimator, wi, wo, rng, &mut total);
+                total.0
+            }
+        }
+    }
+
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    ) {
+        Microsurface::eval(self, estimator, wi, wo, rng, orders);
+    }
+
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>> {
+        Microsurface::sample(self, wi, rng)
+    }
+
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
+        Microsurface::pdf(self, wi, wo)
+    }
+}
+
+/// A surface from its two sides.
+pub struct Sides {
+    above: Box<dyn Scatter>,
+    /// Absent where nothing comes through.
+    below: Option<Box<dyn Scatter>>,
+}
+
+impl Sides {
+    pub fn of<N, I>(ndf: N, facets: I) -> Self
+    where
+        N: Ndf<Scalar = f64> + Send + Sync + 'static,
+        I: Facets<Scalar = f64> + Send + Sync + 'static,
+    {
+        Self {
+            above: Box::new(Microsurface { ndf, facets }),
+            below: I::TRANSMITS.then(|| {
+                let facets = facets.inverted();
+                Box::new(Microsurface { ndf, facets }) as Box<dyn Scatter>
+            }),
+        }
+    }
+
+    /// The surface as `wi` sees it, and whether that is from below: then z is
+    /// mirrored. Light on the opaque side meets nothing.
+    pub fn seen_from(&self, wi: Vector3<f64>) -> Option<(&dyn Scatter, bool)> {
+        if wi.z > 0.0 {
+            Some((&*self.above, false))
+        } else {
+            self.below.as_deref().map(|below| (below, true))
+        }
+    }
+}
