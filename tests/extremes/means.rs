@@ -49,19 +49,18 @@ fn sampled<N: Ndf<Scalar = f32>, I: Facets<Scalar = f32>>(
 }
 
 /// Walks of thousands of orders end by roulette alone, and it keeps the mean:
-/// nothing is lost on diffuse facets of α = 100 and 300, whose walks take 2·10³ and
-/// 2·10⁴ orders on average without it, and are told by standard errors of 0.2 and 4 %.
+/// nothing is lost on diffuse facets of α = 100 and 1000.
 #[test]
 fn roulette_keeps_the_mean_of_the_longest_walks() {
-    let mut longest = 0;
-    for (k, alpha) in [100.0f32, 300.0].into_iter().enumerate() {
+    let (mut longest, mut most_beyond) = (0, 0);
+    for (k, alpha) in [100.0f32, 1000.0].into_iter().enumerate() {
         let surface = Microsurface {
             ndf: Ggx::isotropic(alpha),
             facets: Diffuse {
                 albedo: Rgb::white(),
             },
         };
-        let exits = sampled(&surface, Vector3::spherical(0.6, 0.0), k as u64, 10_000);
+        let exits = sampled(&surface, Vector3::spherical(0.6, 0.0), k as u64, 50_000);
         let mean = Mean::of(
             exits
                 .iter()
@@ -75,12 +74,13 @@ fn roulette_keeps_the_mean_of_the_longest_walks() {
             .max()
             .max(Some(longest))
             .unwrap_or(0);
-        println!("diffuse α {alpha}: {mean:?}, {beyond} of 10000 beyond 16384 orders");
-        assert!(beyond > 50, "α {alpha}: no long walks to judge by");
+        println!("diffuse α {alpha}: {mean:?}, {beyond} of 50000 beyond 16384 orders");
+        most_beyond = most_beyond.max(beyond);
         // Two comparisons: false alarm 1 in 1000.
         let score = (mean.value - 1.0) / mean.error;
         assert!(score.abs() < bound(2), "α {alpha}: {mean:?}");
     }
+    assert!(most_beyond > 50, "no long walks to judge by");
     assert!(longest > 1 << 15, "{longest}");
 }
 
