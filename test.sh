@@ -39,6 +39,7 @@ stage clippy cargo clippy --locked --workspace --all-targets -- -D warnings
 stage documentation documentation
 stage tests tests
 stage python-package python_package
+stage extending tests/extending.sh
 
 printf '\n== summary\n'
 grep '^test result:' "$results"
