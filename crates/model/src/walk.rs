@@ -5,13 +5,13 @@ use super::{
     At, Bounce, Draw, Exit, Facets, Microsurface, Ndf, Real, Rgb, Side, Tally, Vector3, enters,
 };
 
-/// When a walk that has lost weight is played against: continuing costs more
-/// than it can bring.
+/// Russian roulette for walks that have lost weight: to continue costs more than
+/// it can bring.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Roulette {
-    /// Weights below this share of the first are.
+    /// Applies to weights below this share of the first,
     pub weight: f64,
-    /// From this order on.
+    /// and from this order on.
     pub from: u32,
 }
 
