@@ -212,9 +212,10 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         Err(error) => reporter.warn(&format!("{error}; it is tried again later")),
     };
     let cpu_before = cpu_seconds();
+    let show = |progress| reporter.show(progress);
     let control = Control {
         interrupt: Some(signals.interrupt()),
-        progress: Some(&|progress| reporter.show(progress)),
+        progress: Some(&show),
         checkpoint: Some(Checkpoint {
             interval: (args.checkpoint > 0.0).then(|| Duration::from_secs_f64(args.checkpoint)),
             now: signals.save(),
