@@ -136,7 +136,7 @@ impl OutputPath {
 /// tries to write into it.
 ///
 /// # Errors
-/// When [`replace`] could not succeed.
+/// When the file could not be replaced.
 pub fn check_output(path: &Path) -> Result<(), OutputError> {
     let place = Place::of(path);
     let target = match &place {
