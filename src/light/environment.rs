@@ -18,7 +18,7 @@ const LEFT_OUT: f64 = 0.5;
 /// texel centres, round the seam; v = 1 is the upper edge of the first row.
 ///
 /// Directions are chosen by texel, in proportion to its solid angle times what
-/// the mean luminance of the bilinear image over it exceeds [`LEFT_OUT`] of the
+/// the mean luminance of the bilinear image over it exceeds `LEFT_OUT` of the
 /// image's mean by, and uniformly in solid angle within it. What is darker has
 /// density zero: BSDF samples find it, and have no rival there (MIS
 /// compensation, Karlík, Šik, Vévoda, Skřivan and Křivánek 2019, "MIS
