@@ -88,16 +88,21 @@ impl RenderSettings {
         }
     }
 
-    /// The bytes that the film, the pilots of path splitting and the finished
-    /// images take at once: measured per pixel, by the peak of whole renders.
+    /// The most bytes that the film takes at once with what stands beside it: pilots of
+    /// path splitting first, finished images at the end. Measured per pixel, by the
+    /// peak of whole renders of 600² and 1200² pixels.
     #[must_use]
     pub fn memory(&self) -> u64 {
-        const COLOR: u64 = 122;
-        const PILOTS: u64 = 112;
-        const AOV: u64 = 54;
-        let pilots = if self.branches == Some(1) { 0 } else { PILOTS };
+        const PILOTS: u64 = 204;
+        const PILOTS_AOV: u64 = 51;
+        const FINISHED: u64 = 158;
+        const FINISHED_AOV: u64 = 79;
         let aovs = self.aovs.iter().count() as u64;
-        self.window.area() as u64 * (COLOR + pilots + AOV * aovs)
+        let pilots = match self.branches {
+            Some(1) => 0,
+            _ => PILOTS + PILOTS_AOV * aovs,
+        };
+        self.window.area() as u64 * pilots.max(FINISHED + FINISHED_AOV * aovs)
     }
 
     /// An empty film for the window, which must lie within the image.
