@@ -16,6 +16,9 @@ mkdir -p "$blends"
 build() { # scene
     nice blender -b --factory-startup --python "$here/scenes/$1.py" -- "$blends/$1.blend"
     mkdir -p "$root/scenes/$1"
+    # All but the references comes from the export, which writes over no file that
+    # an earlier one has not listed.
+    find "$root/scenes/$1" -maxdepth 1 -type f ! -name 'cycles_*' -delete
     nice blender -b "$blends/$1.blend" --python "$here/export.py" -- "$root/scenes/$1"
 }
 

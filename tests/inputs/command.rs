@@ -51,9 +51,9 @@ fn too_much_is_refused_in_a_sentence() {
         ),
         (
             &["render", "s.yaml", "--memory", "1e3"],
-            "a film of 8 × 8 pixels needs 7.8 kB, but 1.0 kB of 1.0 kB are left; --memory sets the limit",
+            "a film of 8 × 8 pixels needs 10.1 kB, but 1.0 kB of 1.0 kB are left; --memory sets the limit",
         ),
-        (&["info", "s.yaml", "--memory", "8e3"], "more than the"),
+        (&["info", "s.yaml", "--memory", "11e3"], "more than the"),
         (
             &[
                 "render",
@@ -65,7 +65,7 @@ fn too_much_is_refused_in_a_sentence() {
                 "--memory",
                 "8e9",
             ],
-            "a film of 32768 × 32768 pixels needs 131.0 GB",
+            "a film of 32768 × 32768 pixels needs 169.7 GB",
         ),
         (
             &["render", "."],
