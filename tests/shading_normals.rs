@@ -7,7 +7,7 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use smithwalk::bsdf::Bsdf;
+use smithwalk::bsdf::{Bsdf, seen_by_closures};
 use smithwalk::description::{Description, Estimator, Material};
 use smithwalk::embree::Ray;
 use smithwalk::features::Features;
@@ -88,6 +88,49 @@ impl Sums {
         let mean = self.sum / self.n;
         let variance = (self.squares / self.n - mean * mean).max(0.0);
         (mean, (variance / self.n).sqrt())
+    }
+}
+
+/// Layers weigh what lies below by their own albedo: it must be the one that they have
+/// for the viewer as closures see it, or coarse meshes would darken or shine.
+#[test]
+fn layers_weigh_each_other_for_the_viewer_that_closures_see() {
+    for text in [
+        "principled: {version: 3.4, base_color: 1, roughness: 0.3, clearcoat: 1, sheen: 1}",
+        "principled: {version: 4.5, base_color: 1, roughness: 0.3, coat_weight: 1}",
+        "principled: {version: 5.0, base_color: 1, roughness: 0, diffuse_roughness: 1}",
+        "principled: {version: 5.0, base_color: 1, roughness: 0.2, transmission_weight: 0.5}",
+        "diffuse: {color: 1, roughness: 1}",
+    ] {
+        let material = material(text);
+        let mut rng = Stream(Pcg64Mcg::seed_from_u64(7));
+        for tilt in TILTS {
+            let normal = Vec3::new(tilt.sin(), 0.0, tilt.cos());
+            for _ in 0..2_000 {
+                let wo = uniform(&mut rng);
+                let wo = wo * wo.z.signum();
+                let seen = seen_by_closures(normal, Vec3::Z, wo);
+                let mut surface = Surface::horizontal(true).with_normal(normal);
+                let leaning: Bsdf = material.bsdf(&[], &surface, View { wo, camera: false });
+                surface.geometric_normal = normal;
+                let view = View {
+                    wo: seen,
+                    camera: false,
+                };
+                let level: Bsdf = material.bsdf(&[], &surface, view);
+                let choice = rng.draw();
+                let weight = |bsdf: &Bsdf, wo: Vec3| {
+                    let sample = bsdf.sample(wo, choice, &mut rng.clone());
+                    sample.map_or(Vec3::ZERO, |s| s.weight)
+                };
+                let (ours, right) = (weight(&leaning, wo), weight(&level, seen));
+                assert!(
+                    (ours - right).abs().max_element() <= 2e-3 * right.max_element(),
+                    "{text}, {tilt} rad, {wo}: {ours}, not {right}"
+                );
+                let _: f32 = rng.draw();
+            }
+        }
     }
 }
 

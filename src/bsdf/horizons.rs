@@ -51,6 +51,13 @@ pub fn within_reach(normal: Vec3, geometric: Vec3) -> Vec3 {
     })
 }
 
+/// The direction of a viewer above the true surface as the closures of this shading
+/// normal see it: what weighs them by their own albedo must know the same.
+#[must_use]
+pub fn seen_by_closures(shading: Vec3, geometric: Vec3, wo: Vec3) -> Vec3 {
+    Horizons::new(shading, geometric).viewer(wo)
+}
+
 /// The horizons of a shading normal and of the true one; both normals are of unit
 /// length, on the viewer's side, and [`within_reach`] of each other.
 #[derive(Clone, Copy, Debug)]

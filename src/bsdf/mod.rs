@@ -42,7 +42,7 @@ pub use closure::Closure;
 pub use compensation::{Albedos, MeanWeight, WhiteFacets};
 pub use diffuser::{Diffuser, OrenNayar};
 pub use frame::Frame;
-pub use horizons::within_reach;
+pub use horizons::{seen_by_closures, within_reach};
 pub use interface::Interface;
 pub use lambert::Lambert;
 pub use mirror::Mirror;

@@ -17,6 +17,7 @@ use glam::Vec3;
 use super::{Surface, View};
 use crate::bsdf::{
     Bsdf, Closure, Diffuser, Frame, Lambert, MAX_CLOSURES, OrenNayar, WeightedClosure,
+    seen_by_closures,
 };
 use crate::color::Rgb;
 use crate::description::Version;
@@ -93,6 +94,12 @@ impl Material {
             1
         };
         let point = Point::shaded(textures, surface, view);
+        let seen = || seen_by_closures(surface.normal, surface.geometric_normal, view.wo);
+        // Layers are weighed by the albedo of what lies on them.
+        let layered = || Point {
+            cos: seen().dot(surface.normal).max(0.0),
+            ..point
+        };
         for weighted in self.leaves.iter().take(most) {
             let share = if has::<F>(Features::MIXES) {
                 weighted.share_at::<F>(&point)
@@ -117,15 +124,15 @@ impl Material {
                     rough.tangent.frame::<F>(rough.rotation, &point, surface),
                 ),
                 Leaf::Principled3(node) if has::<F>(Features::PRINCIPLED) => {
-                    node.add(&mut bsdf, &point, surface, share);
+                    node.add(&mut bsdf, &layered(), surface, share);
                     continue;
                 }
                 Leaf::Principled4(node) if has::<F>(Features::PRINCIPLED) => {
-                    node.add(&mut bsdf, &point, surface, share);
+                    node.add(&mut bsdf, &layered(), surface, share);
                     continue;
                 }
                 leaf if has::<F>(Features::DIFFUSERS) => {
-                    match leaf.diffuser::<F>(&point, isotropic().to_local(view.wo)) {
+                    match leaf.diffuser::<F>(&point, isotropic().to_local(seen())) {
                         Some(lobe) => (Closure::Diffuser(lobe), isotropic()),
                         None => continue,
                     }

@@ -15,7 +15,8 @@ pub struct Point<'a> {
     pub textures: &'a [Texture],
     /// Texture coordinates.
     pub uv: Vec2,
-    /// The cosine between the normal and the viewer, 0 or more.
+    /// The cosine between the normal and the viewer, either way round: an interpolated
+    /// normal may face away, and nodes take it for the other side then.
     pub cos: f32,
     /// Whether the viewer is outside.
     pub front: bool,
@@ -31,7 +32,7 @@ impl<'a> Point<'a> {
         Self {
             textures,
             uv: surface.uv,
-            cos: surface.normal.dot(view.wo).max(0.0),
+            cos: surface.normal.dot(view.wo).abs(),
             front: surface.front,
             camera: view.camera,
         }
