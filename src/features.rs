@@ -60,6 +60,8 @@ features! {
     VIEW_DEPENDENT = 19, "view-dependent mixes", "Fresnel's factor, facing and the like per hit";
     /// Blender's node.
     PRINCIPLED = 20, "principled", "the node's layers put together per hit";
+    /// Stacks of interfaces.
+    LAYERS = 21, "layers", "walks among interfaces in sampling and evaluation";
 }
 
 impl Features {

@@ -174,6 +174,73 @@ fn keys_that_exclude_or_need_each_other() {
 }
 
 #[test]
+fn layers_that_contradict_themselves() {
+    let stack = |keys: &str| format!("materials: {{m: {{layered: {{{keys}}}}}}}");
+    let cases = [
+        ("nothing at all", "interfaces: []"),
+        (
+            "two bases",
+            "interfaces: [], base: {diffuse: {}}, base: {conductor: {}}",
+        ),
+        (
+            "a negative thickness",
+            "interfaces: [{absorption: 3, thickness: -1}], base: {diffuse: {}}",
+        ),
+        ("an index of 0", "interfaces: [{ior: 0}], base: {diffuse: {}}"),
+        (
+            "absorption said twice",
+            "interfaces: [{absorption: 3, transmittance: 0.5}], base: {diffuse: {}}",
+        ),
+        (
+            "thickness of nothing",
+            "interfaces: [{thickness: 3}], base: {diffuse: {}}",
+        ),
+        (
+            "a slab that nothing comes through",
+            "interfaces: [{transmittance: [0.5, 0, 1]}], base: {diffuse: {}}",
+        ),
+        ("absorption below all", "interfaces: [{}, {absorption: 1}]"),
+        (
+            "a tangent of a layer's own",
+            "interfaces: [{rotation: 0.25}], base: {conductor: {tangent: {radial: z}}}",
+        ),
+        (
+            "single scattering",
+            "interfaces: [{scattering: single}], base: {conductor: {scattering: single}}",
+        ),
+        ("a base that shines", "interfaces: [{}], base: {emission: {}}"),
+        (
+            "a stack on a stack",
+            "interfaces: [{}], base: {layered: {interfaces: [{}]}}",
+        ),
+        (
+            "a part that is open",
+            "interfaces: [{}], base: {mix: {a: {dielectric: {}}, b: {diffuse: {}}}}",
+        ),
+        (
+            "coloured glass",
+            "interfaces: [{}], base: {dielectric: {color: 0.5}}",
+        ),
+        (
+            "a mix by Fresnel's factor",
+            "interfaces: [{}], base: {mix: {factor: {fresnel: {}}, a: {diffuse: {}}, b: {conductor: {}}}}",
+        ),
+        (
+            "a rough diffuse base",
+            "interfaces: [{}], base: {diffuse: {roughness: 0.5}}",
+        ),
+        ("a base of itself", "interfaces: [{}], base: m"),
+    ]
+    .map(|(what, keys)| (what, stack(keys)));
+    insta::assert_snapshot!(scenes(
+        &cases
+            .iter()
+            .map(|(what, text)| (*what, &**text))
+            .collect::<Vec<_>>()
+    ));
+}
+
+#[test]
 fn values_out_of_range() {
     insta::assert_snapshot!(scenes(&[
         (

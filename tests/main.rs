@@ -17,6 +17,7 @@ mod film_files;
 mod films;
 mod heightfield;
 mod inputs;
+mod layers;
 mod light;
 mod parity;
 mod render;

@@ -43,6 +43,7 @@ impl Clearcoat {
             wi,
             weight: self.eval(wo, wi) / pdf,
             order: 1,
+            delta: false,
         })
     }
 

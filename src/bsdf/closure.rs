@@ -2,13 +2,15 @@
 
 use glam::Vec3;
 
-use super::{BsdfSample, ByFacets, Diffuser, Interface, Lambert, Mirror, Rough, RoughClosure};
+use super::{
+    BsdfSample, ByFacets, Diffuser, Interface, Lambert, Mirror, Rough, RoughClosure, Stack,
+};
 use crate::color::Rgb;
 use crate::features::{Features, has};
 use smithwalk_model::{self as model, Beckmann, Conductor, Draw, Ggx, Tally};
 
 /// Everything that a surface can scatter with.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Closure {
     /// Perfectly diffuse.
     Lambert(Lambert),
@@ -22,6 +24,8 @@ pub enum Closure {
     Rough(RoughClosure),
     /// Another wide lobe.
     Diffuser(Diffuser),
+    /// Interfaces over a base.
+    Layered(Stack),
 }
 
 /// The closures that can be evaluated for several directions at once.
@@ -46,6 +50,7 @@ impl Closure {
             Self::Transparent(_) => has::<F>(Features::TRANSPARENCY),
             Self::Rough(rough) => rough.is_in::<F>(),
             Self::Diffuser(_) => has::<F>(Features::DIFFUSERS),
+            Self::Layered(_) => has::<F>(Features::LAYERS),
         }
     }
 
@@ -53,10 +58,11 @@ impl Closure {
     /// and `pdf` have nothing to say.
     #[must_use]
     pub fn is_delta(&self) -> bool {
-        matches!(
-            self,
-            Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_)
-        )
+        match self {
+            Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => true,
+            Self::Layered(stack) => stack.is_delta(),
+            Self::Lambert(_) | Self::Rough(_) | Self::Diffuser(_) => false,
+        }
     }
 
     /// Draws a direction; see the contract of [`crate::bsdf`]. Degenerate samples
@@ -70,6 +76,7 @@ impl Closure {
         let sample = match self {
             Self::Rough(rough) => rough.sample(wo, rng)?,
             Self::Diffuser(lobe) => lobe.sample(wo, rng)?,
+            Self::Layered(stack) => stack.sample(wo, rng)?,
             Self::Lambert(lambert) => lambert.sample(rng),
             Self::Mirror(mirror) => mirror.sample(wo),
             Self::Interface(interface) => interface.sample(wo, rng)?,
@@ -77,6 +84,7 @@ impl Closure {
                 wi: -wo,
                 weight: *color,
                 order: 1,
+                delta: true,
             },
         };
         sample.is_usable().then_some(sample)
@@ -99,6 +107,7 @@ impl Closure {
         match self {
             Self::Rough(rough) => rough.eval(wo, wi, rng, tally),
             Self::Diffuser(lobe) => tally.add(1, model::Rgb(lobe.eval(wo, wi).to_array())),
+            Self::Layered(stack) => stack.eval(wo, wi, rng, tally),
             Self::Lambert(lambert) => tally.add(1, model::Rgb(lambert.eval(wi).to_array())),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => {}
         }
@@ -134,6 +143,7 @@ impl Closure {
         match self {
             Self::Rough(rough) => rough.pdf(wo, wi),
             Self::Diffuser(lobe) => lobe.pdf(wo, wi),
+            Self::Layered(stack) => stack.pdf(wo, wi),
             Self::Lambert(lambert) => lambert.pdf(wi),
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => 0.0,
         }

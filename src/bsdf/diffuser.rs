@@ -60,6 +60,7 @@ impl Diffuser {
             wi,
             weight: self.eval(wo, wi) / self.pdf(wo, wi).max(f32::MIN_POSITIVE),
             order: 1,
+            delta: false,
         })
     }
 

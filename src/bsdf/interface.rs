@@ -56,6 +56,7 @@ impl Interface {
             wi,
             weight,
             order: 1,
+            delta: true,
         })
     }
 }

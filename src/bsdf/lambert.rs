@@ -26,6 +26,7 @@ impl Lambert {
             wi,
             weight: self.albedo,
             order: 1,
+            delta: false,
         }
     }
 

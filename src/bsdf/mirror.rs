@@ -21,6 +21,7 @@ impl Mirror {
             wi: Vec3::new(-wo.x, -wo.y, wo.z),
             weight: Rgb::from(self.fresnel.reflectance(wo.z).0),
             order: 1,
+            delta: true,
         }
     }
 }

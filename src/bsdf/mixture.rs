@@ -15,7 +15,7 @@ use smithwalk_model::{self as model, Draw, LANES, Tally};
 pub const MAX_CLOSURES: usize = 16;
 
 /// One closure of the mix, weighted for the viewer's direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct WeightedClosure {
     /// The factor on its light, per channel. It may depend on `wo`: a coat weighs
     /// what lies below it by one minus its own albedo.
@@ -117,7 +117,7 @@ impl<const F: u32> Bsdf<F> {
                 sample.weight
             },
             order: sample.order,
-            delta: part.closure.is_delta(),
+            delta: sample.delta,
             straight: matches!(part.closure, Closure::Transparent(_)),
         })
     }

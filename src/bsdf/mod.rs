@@ -35,6 +35,7 @@ mod mirror;
 mod mixture;
 mod rise;
 mod rough;
+mod stack;
 mod table;
 
 pub use clearcoat::Clearcoat;
@@ -49,6 +50,7 @@ pub use mirror::Mirror;
 pub use mixture::{Bsdf, InLanes, MAX_CLOSURES, ScatterSample, WeightedClosure};
 pub use rise::Rises;
 pub use rough::{Method, Rough};
+pub use stack::Stack;
 pub use table::{ByFacets, Distribution, FacetKind, Listed, RoughClosure, Width, WidthInLanes};
 
 use glam::Vec3;
@@ -66,6 +68,9 @@ pub struct BsdfSample {
     pub weight: Rgb,
     /// How many facets the light met: 1 is single scattering.
     pub order: u32,
+    /// Whether this is one of few single directions, which no light sample can meet
+    /// and [`Closure::eval`] does not know of.
+    pub delta: bool,
 }
 
 impl BsdfSample {
@@ -85,6 +90,7 @@ impl From<model::Exit<f32>> for BsdfSample {
             wi: from_model(exit.direction),
             weight: Rgb::from(exit.weight.0),
             order: exit.order,
+            delta: false,
         }
     }
 }

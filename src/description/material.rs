@@ -1,5 +1,6 @@
 //! Materials.
 
+use super::layered::Layered;
 use super::principled::{Principled, Version};
 use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness};
 use super::validate::{At, Check, Range};
@@ -37,6 +38,8 @@ pub enum Material {
     Mix(Mix),
     /// Two materials, added.
     Sum(Sum),
+    /// Interfaces over a base.
+    Layered(Layered),
     /// Blender's node.
     Principled(Box<Principled>),
 }
@@ -530,21 +533,24 @@ impl Material {
                 sum.a.check(check, at.key("a"));
                 sum.b.check(check, at.key("b"));
             }
+            Self::Layered(layered) => layered.check(check, &at.key("layered")),
             Self::Principled(principled) => principled.check(check, &at.key("principled")),
         }
     }
 
     /// The materials that it is made of.
-    pub(crate) fn parts(&self) -> Option<[&MaterialRef; 2]> {
-        match self {
-            Self::Mix(Mix { a, b, .. }) | Self::Sum(Sum { a, b }) => Some([a, b]),
-            _ => None,
-        }
+    pub(crate) fn parts(&self) -> impl Iterator<Item = &MaterialRef> {
+        let parts = match self {
+            Self::Mix(Mix { a, b, .. }) | Self::Sum(Sum { a, b }) => [Some(a), Some(b)],
+            Self::Layered(layered) => [layered.base.as_ref(), None],
+            _ => [None; 2],
+        };
+        parts.into_iter().flatten()
     }
 }
 
 impl MaterialRef {
-    fn check(&self, check: &mut Check<'_, '_>, at: At) {
+    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: At) {
         match self {
             Self::Name(name) => check.reference("materials", "material", name, at),
             Self::Inline(material) => material.check(check, at),
@@ -584,7 +590,7 @@ impl Dielectric {
 }
 
 impl Rough {
-    fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
         match &self.roughness {
             Roughness::Alpha(alpha) => check.scalar(alpha, Range::NonNegative, at.key("alpha")),
             Roughness::AlphaXy { x, y } => {

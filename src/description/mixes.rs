@@ -60,7 +60,7 @@ fn depth<'a>(
 }
 
 fn mixed_names<'a>(material: &'a Material, names: &mut Vec<&'a str>) {
-    for part in material.parts().into_iter().flatten() {
+    for part in material.parts() {
         match part {
             MaterialRef::Name(name) => names.push(name),
             MaterialRef::Inline(material) => mixed_names(material, names),

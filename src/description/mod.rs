@@ -5,6 +5,7 @@
 
 mod camera;
 mod document;
+mod layered;
 mod light;
 mod material;
 mod mixes;
@@ -23,6 +24,8 @@ pub use crate::texture::{Channel, ColorSpace, Interpolation};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
 };
+pub(crate) use layered::fits;
+pub use layered::{Interface, Layered, Slab};
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
     Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,

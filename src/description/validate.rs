@@ -73,7 +73,7 @@ impl At {
         Self([&self.0[..], &[Step::Key(key.to_owned())]].concat())
     }
 
-    fn index(&self, index: usize) -> Self {
+    pub(super) fn index(&self, index: usize) -> Self {
         Self([&self.0[..], &[Step::Index(index)]].concat())
     }
 }

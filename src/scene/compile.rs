@@ -1,6 +1,7 @@
 //! From what the file says of a material to what is rendered, and to what that
 //! needs: names become indices, mixes flat lists, the estimator is chosen.
 
+mod layered;
 mod principled;
 #[cfg(test)]
 mod tests;
@@ -37,6 +38,9 @@ pub enum MaterialError {
     /// A textured index of refraction where a table is made for each.
     #[error("the estimator `compensated` takes no texture for `ior`")]
     TexturedIndex,
+    /// Layers that no stack can be made of, and why.
+    #[error("`layered`: {0}")]
+    Stack(String),
 }
 
 /// What a material needs of everything else.
@@ -264,6 +268,7 @@ impl<'a> Compiler<'a> {
                 Leaf::Velvet(self.tint(&velvet.color)?, self.number(&velvet.sigma)?)
             }
             desc::Material::Sheen(_) => return Err(MaterialError::Unknown("sheen")),
+            desc::Material::Layered(layered) => self.layered(layered)?,
             desc::Material::Principled(node) => self.principled(node)?,
             desc::Material::Emission(emission) => Leaf::Emission(
                 self.tint(&emission.color)?,
@@ -287,14 +292,20 @@ impl<'a> Compiler<'a> {
     }
 
     fn add_part(&mut self, part: &desc::MaterialRef, above: &Above) -> Result<(), MaterialError> {
-        let material = match part {
-            desc::MaterialRef::Inline(material) => material,
+        self.add(self.part(part)?, above)
+    }
+
+    fn part<'b>(&self, part: &'b desc::MaterialRef) -> Result<&'b desc::Material, MaterialError>
+    where
+        'a: 'b,
+    {
+        match part {
+            desc::MaterialRef::Inline(material) => Ok(material),
             desc::MaterialRef::Name(name) => {
                 let described = self.described.get(name);
-                described.ok_or_else(|| MaterialError::UnknownMaterial(name.clone()))?
+                described.ok_or_else(|| MaterialError::UnknownMaterial(name.clone()))
             }
-        };
-        self.add(material, above)
+        }
     }
 
     fn texture(&mut self, name: &str) -> Result<usize, MaterialError> {
@@ -364,7 +375,31 @@ impl<'a> Compiler<'a> {
     }
 
     fn rough(&mut self, rough: &desc::Rough, facet: Facet) -> Result<Leaf, MaterialError> {
-        let (roughness, isotropic) = match &rough.roughness {
+        let (roughness, isotropic) = self.roughness(&rough.roughness)?;
+        let tangent = self.tangent(rough.tangent, isotropic);
+        let method = self.method(rough.scattering, rough.distribution, facet)?;
+        self.need_if(
+            Features::MULTIPLE_SCATTERING,
+            method.is_multiple() && !roughness.is_smooth(),
+        );
+        self.need_if(rough.distribution.feature(), true);
+        self.need_if(facet.kind().feature(), true);
+        Ok(Leaf::Rough(RoughMaterial {
+            distribution: rough.distribution,
+            roughness,
+            rotation: self.number(&rough.rotation)?,
+            tangent,
+            facet,
+            method,
+        }))
+    }
+
+    /// How rough, and whether it is the same in all directions.
+    fn roughness(
+        &mut self,
+        roughness: &desc::Roughness,
+    ) -> Result<(Roughness, bool), MaterialError> {
+        Ok(match roughness {
             desc::Roughness::Alpha(alpha) => {
                 let alpha = self.number(alpha)?;
                 (Roughness::Alpha(alpha, alpha), true)
@@ -388,23 +423,7 @@ impl<'a> Compiler<'a> {
                     isotropic,
                 )
             }
-        };
-        let tangent = self.tangent(rough.tangent, isotropic);
-        let method = self.method(rough.scattering, rough.distribution, facet)?;
-        self.need_if(
-            Features::MULTIPLE_SCATTERING,
-            method.is_multiple() && !roughness.is_smooth(),
-        );
-        self.need_if(rough.distribution.feature(), true);
-        self.need_if(facet.kind().feature(), true);
-        Ok(Leaf::Rough(RoughMaterial {
-            distribution: rough.distribution,
-            roughness,
-            rotation: self.number(&rough.rotation)?,
-            tangent,
-            facet,
-            method,
-        }))
+        })
     }
 
     /// Keeps what people are told of a material that is rendered otherwise than

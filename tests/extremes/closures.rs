@@ -122,8 +122,8 @@ fn smooth() -> Vec<Subject> {
     let mut push = |name: String, closure: Closure, lossless| {
         list.push(Subject {
             name,
+            single: closure.clone(),
             closure,
-            single: closure,
             transmits: true,
             lossless,
             most: 1.0,

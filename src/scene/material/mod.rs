@@ -2,11 +2,13 @@
 //! numbers or texture indices.
 
 mod factor;
+mod layers;
 mod principled;
 mod rough;
 mod value;
 
 pub use factor::Factor;
+pub use layers::{BaseLayer, InterfaceLayer, LayeredMaterial, Layers, Relief, Slab};
 pub use principled::{Principled3, Principled4, Setup};
 pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
 pub use value::{Number, Point, Tint};
@@ -41,6 +43,8 @@ pub enum Leaf {
     Rough(RoughMaterial),
     /// Radiance colour · strength on both sides, W·m⁻²·sr⁻¹.
     Emission(Tint, Number),
+    /// Interfaces over a base.
+    Layered(Box<LayeredMaterial>),
     /// The node of Blender 2.8 to 3.6.
     Principled3(Box<Principled3>),
     /// The node of Blender 4 and 5.
@@ -123,6 +127,12 @@ impl Material {
                     rough.closure::<F>(&point),
                     rough.tangent.frame::<F>(rough.rotation, &point, surface),
                 ),
+                Leaf::Layered(layers) if has::<F>(Features::LAYERS) => {
+                    match layers.closure::<F>(&point, surface) {
+                        Some(closure) => closure,
+                        None => continue,
+                    }
+                }
                 Leaf::Principled3(node) if has::<F>(Features::PRINCIPLED) => {
                     node.add(&mut bsdf, &layered(), surface, share);
                     continue;
@@ -211,6 +221,7 @@ impl Material {
     pub fn transmits(&self) -> bool {
         self.leaves.iter().any(|weighted| match &weighted.leaf {
             Leaf::Rough(rough) => matches!(rough.facet, Facet::Glass(..) | Facet::Refraction(..)),
+            Leaf::Layered(layers) => layers.is_open(),
             Leaf::Principled3(node) => !node.transmission.is(0.0),
             Leaf::Principled4(node) => !node.transmission_weight.is(0.0),
             Leaf::Translucent(_) => true,
@@ -223,6 +234,7 @@ impl Material {
     pub fn has_radial_tangent(&self) -> bool {
         self.leaves.iter().any(|l| match &l.leaf {
             Leaf::Rough(rough) => matches!(rough.tangent, Tangent::Radial(_)),
+            Leaf::Layered(layers) => layers.is_radial(),
             Leaf::Principled3(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
             Leaf::Principled4(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
             _ => false,
@@ -240,6 +252,7 @@ impl Material {
             | Leaf::Transparent(tint) => tint.at::<ALL>(point),
             Leaf::Emission(..) => Rgb::ZERO,
             Leaf::Rough(rough) => rough.albedo::<ALL>(point),
+            Leaf::Layered(layers) => layers.albedo::<ALL>(point),
             Leaf::Principled3(node) => node.base_color.at::<ALL>(point),
             Leaf::Principled4(node) => node.base_color.at::<ALL>(point),
         };

@@ -29,7 +29,7 @@ pub enum Roughness {
 
 impl Roughness {
     #[inline]
-    fn alphas<const F: u32>(self, point: &Point<'_>) -> [f32; 2] {
+    pub(super) fn alphas<const F: u32>(self, point: &Point<'_>) -> [f32; 2] {
         match self {
             Self::Alpha(x, y) => {
                 let at = |number: Number| number.at::<F>(point).max(0.0);
@@ -97,6 +97,16 @@ pub enum Reflectance {
 }
 
 impl Reflectance {
+    /// Whether it is the same at every point.
+    pub(super) fn is_fixed(self) -> bool {
+        match self {
+            Self::Constant(tint) | Self::Schlick(tint) => tint.is_fixed(),
+            Self::Complex { eta: a, k: b }
+            | Self::F82 { f0: a, f82: b }
+            | Self::EdgeTint { f0: a, tint: b } => a.is_fixed() && b.is_fixed(),
+        }
+    }
+
     #[inline]
     pub(super) fn at<const F: u32>(self, point: &Point<'_>) -> ConductorFresnel<f32> {
         let at = |tint: Tint| to_model_color(tint.at::<F>(point));
@@ -273,7 +283,7 @@ pub(super) fn eta(ior: f32, front: bool) -> f32 {
 pub(super) const MIN_ALPHA: f32 = 1e-7;
 
 /// The least index of refraction, for textures; as in Cycles.
-const LEAST_IOR: f32 = 1e-5;
+pub(super) const LEAST_IOR: f32 = 1e-5;
 
 pub(super) fn to_model_color(color: Rgb) -> model::Rgb<f32> {
     model::Rgb(color.to_array())

@@ -25,6 +25,18 @@ pub struct Point<'a> {
 }
 
 impl<'a> Point<'a> {
+    /// A point to look values up at that are everywhere the same.
+    #[must_use]
+    pub(super) fn nowhere() -> Self {
+        Self {
+            textures: &[],
+            uv: Vec2::ZERO,
+            cos: 1.0,
+            front: true,
+            camera: false,
+        }
+    }
+
     /// A point as its closures see it: by the shading normal.
     #[must_use]
     #[inline(always)]
@@ -95,6 +107,11 @@ impl Number {
         }
     }
 
+    /// Whether it is the same at every point.
+    pub(super) fn is_fixed(self) -> bool {
+        matches!(self, Self::Constant(_))
+    }
+
     /// Whether it is this number at every point.
     #[must_use]
     pub fn is(self, value: f32) -> bool {
@@ -123,6 +140,11 @@ impl Tint {
                 Rgb::new(r, g, b)
             }
         }
+    }
+
+    /// Whether it is the same at every point.
+    pub(super) fn is_fixed(self) -> bool {
+        matches!(self, Self::Constant(_))
     }
 
     /// Its mean over the texture.
