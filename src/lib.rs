@@ -27,6 +27,7 @@ pub mod light;
 pub mod memory;
 pub mod mesh;
 pub mod metrics;
+pub mod numbered;
 pub mod report;
 pub mod sampler;
 pub mod scene;

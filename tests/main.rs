@@ -15,6 +15,7 @@ mod extreme_scenes;
 mod extremes;
 mod film_files;
 mod films;
+mod frames;
 mod heightfield;
 mod inputs;
 mod layers;

@@ -1,11 +1,12 @@
 //! `smithwalk render`.
 
+mod frames;
 mod outputs;
 mod progress;
 mod signals;
 
 use std::io::Write;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -13,10 +14,11 @@ use std::time::Duration;
 use anyhow::{Context, ensure};
 use smithwalk::description::{Description, Estimator};
 use smithwalk::features::Features;
-use smithwalk::film::{Film, SavedFilm};
+use smithwalk::film::{Film, Identity, SavedFilm};
 use smithwalk::image::Window;
 use smithwalk::integrator::{Checkpoint, Control, RenderReport, Stop, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene};
+use xxhash_rust::xxh3::xxh3_128;
 
 use super::scene::SceneArgs;
 use outputs::Outputs;
@@ -60,6 +62,9 @@ pub struct Args {
     /// Render this share of the samples of every pixel alone, I from 0 to N − 1, for `merge`
     #[arg(long, value_name = "I/N", value_parser = parse_part)]
     part: Option<Part>,
+    /// Render these frames of an animation, both ends included; a row of # in OUT stands for the number
+    #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
+    frames: Option<FrameRange>,
     /// How progress is told on stderr
     #[arg(long, value_name = "KIND", default_value = "bar")]
     progress: ProgressKind,
@@ -158,6 +163,23 @@ fn parse_part(text: &str) -> Result<Part, String> {
     }
 }
 
+/// Numbers of frames.
+type FrameRange = RangeInclusive<i32>;
+
+fn parse_frames(text: &str) -> Result<FrameRange, String> {
+    let number = |text: &str| {
+        let error = |_| format!("`{text}` is no number of a frame");
+        text.trim().parse::<i32>().map_err(error)
+    };
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let (first, last) = (number(first)?, number(last.trim_start_matches('='))?);
+    if first <= last {
+        Ok(first..=last)
+    } else {
+        Err(format!("frame {last} comes before frame {first}"))
+    }
+}
+
 /// The longest time that can be asked for, in seconds: a thousand years.
 const LONGEST_TIME: f64 = 3.2e10;
 
@@ -176,81 +198,165 @@ fn interval(text: &str) -> Result<f64, String> {
 }
 
 pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
+    if let Some(range) = &args.frames {
+        return frames::run(args, range, out, log);
+    }
     let mut description = args.scene.describe()?;
     apply(args, &mut description);
-    let outputs = Outputs::new(&args.scene.scene, &args.output, args.part, args.resume)?;
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()
-            .context("can't start the threads")?;
-    }
-    let Resolved {
-        scene,
-        settings,
-        identity,
-        ..
-    } = {
-        let settings = override_settings(args, RenderSettings::new(&description))?;
-        args.scene
-            .resolve_beside(&description, settings.memory(), log)?
-    };
-    let settings = override_settings(args, settings)?;
-    let mut film = settings.film();
-    if args.resume && outputs.film.exists() {
-        film.resume(SavedFilm::read(&outputs.film)?, &identity)
-            .context("start afresh without --resume, or with another output")?;
-        let samples = film.samples_per_pixel();
-        writeln!(log, "resuming at {samples} samples per pixel")?;
-    }
-
+    let outputs = Outputs::new(args, None)?;
+    start_threads(args)?;
+    let settings = override_settings(args, RenderSettings::new(&description))?;
+    let resolved = args
+        .scene
+        .resolve_beside(&description, settings.memory(), log)?;
     let signals = Signals::listen()?;
-    let reporter = Reporter::new(args.progress, &settings.limits);
-    let target = settings.limits.spp;
-    let mut save = |film: &Film| match film.save(&outputs.film, &identity, target) {
-        Ok(()) => reporter.saved(),
-        Err(error) => reporter.warn(&format!("{error}; it is tried again later")),
+    let shot = Shot {
+        args,
+        description: &description,
+        outputs: &outputs,
+        signals: &signals,
+        frame: None,
     };
-    let cpu_before = cpu_seconds();
-    let show = |progress| reporter.show(progress);
-    let control = Control {
-        interrupt: Some(signals.interrupt()),
-        progress: Some(&show),
-        checkpoint: Some(Checkpoint {
-            interval: (args.checkpoint > 0.0).then(|| Duration::from_secs_f64(args.checkpoint)),
-            now: signals.save(),
-            save: &mut save,
-        }),
-    };
-    let report = render(&scene, &settings, &mut film, control)
-        .with_context(|| args.scene.scene.display().to_string())?;
-    reporter.finish();
-    let cpu = cpu_before
-        .zip(cpu_seconds())
-        .map(|(before, after)| after - before);
-
-    // All files first: standard output may be closed.
-    let interrupted = report.stop == Stop::Interrupted;
-    let mut failed = outputs
-        .keep_film(&film, &identity, target, interrupted)
-        .err();
-    let mut image = film.develop();
-    image.attributes = attributes(args, &description, &report);
-    for output in &outputs.images {
-        // One that fails must not keep the others from being written.
-        if let Err(error) = output.write(&image, settings.exposure) {
-            failed = Some(error.into());
-        }
-    }
-    if let Some(error) = failed {
-        let rescued = outputs.rescue(&film, &identity, target);
-        return Err(error.context(rescued));
-    }
-    for path in outputs.written(interrupted) {
-        writeln!(out, "{}", path.display())?;
-    }
-    summarise(out, &scene, &film, &report, cpu)?;
+    let done = shot.take(&resolved, log)?;
+    shot.tell(&done, &resolved.scene, out)?;
     Ok(signals.exit_code())
+}
+
+fn start_threads(args: &Args) -> anyhow::Result<()> {
+    let Some(threads) = args.threads else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(usize::from(threads))
+        .build_global()
+        .context("can't start the threads")
+}
+
+/// One image to be rendered.
+struct Shot<'a> {
+    args: &'a Args,
+    description: &'a Description,
+    outputs: &'a Outputs,
+    signals: &'a Signals,
+    /// The number of the frame in an animation.
+    frame: Option<i32>,
+}
+
+/// What came of it.
+struct Done {
+    film: Film,
+    report: RenderReport,
+    /// Seconds of all cores.
+    cpu: Option<f64>,
+}
+
+impl Done {
+    fn is_interrupted(&self) -> bool {
+        self.report.stop == Stop::Interrupted
+    }
+}
+
+impl Shot<'_> {
+    /// Renders and writes all files.
+    fn take(&self, resolved: &Resolved, log: &mut dyn Write) -> anyhow::Result<Done> {
+        let &Self {
+            args,
+            description,
+            outputs,
+            signals,
+            frame,
+        } = self;
+        let Resolved {
+            scene,
+            settings,
+            identity,
+            ..
+        } = resolved;
+        let settings = override_settings(args, settings.clone())?;
+        let mut film = settings.film();
+        if args.resume && outputs.film.exists() {
+            film.resume(SavedFilm::read(&outputs.film)?, identity)
+                .context("start afresh without --resume, or with another output")?;
+            let samples = film.samples_per_pixel();
+            writeln!(log, "resuming at {samples} samples per pixel")?;
+        }
+
+        let reporter = Reporter::new(args.progress, &settings.limits, frame);
+        let target = settings.limits.spp;
+        let mut save = |film: &Film| match film.save(&outputs.film, identity, target) {
+            Ok(()) => reporter.saved(),
+            Err(error) => reporter.warn(&format!("{error}; it is tried again later")),
+        };
+        let cpu_before = cpu_seconds();
+        let show = |progress| reporter.show(progress);
+        let control = Control {
+            interrupt: Some(signals.interrupt()),
+            progress: Some(&show),
+            checkpoint: Some(Checkpoint {
+                interval: (args.checkpoint > 0.0).then(|| Duration::from_secs_f64(args.checkpoint)),
+                now: signals.save(),
+                save: &mut save,
+            }),
+        };
+        let report = render(scene, &settings, &mut film, control)
+            .with_context(|| args.scene.scene.display().to_string())?;
+        reporter.finish();
+        let cpu = cpu_before
+            .zip(cpu_seconds())
+            .map(|(before, after)| after - before);
+
+        let interrupted = report.stop == Stop::Interrupted;
+        let mut failed = outputs
+            .keep_film(&film, identity, target, interrupted)
+            .err();
+        let mut image = film.develop();
+        image.attributes = attributes(args, description, &report);
+        if !interrupted {
+            let mark = complete_mark(identity, description, &settings);
+            image.attributes.push((COMPLETE.to_owned(), mark));
+        }
+        for output in &outputs.images {
+            // One that fails must not keep the others from being written.
+            if let Err(error) = output.write(&image, settings.exposure) {
+                failed = Some(error.into());
+            }
+        }
+        if let Some(error) = failed {
+            let rescued = outputs.rescue(&film, identity, target);
+            return Err(error.context(rescued));
+        }
+        Ok(Done { film, report, cpu })
+    }
+
+    /// Prints it. All files come first: standard output may be closed.
+    fn tell(&self, done: &Done, scene: &Scene, out: &mut dyn Write) -> anyhow::Result<()> {
+        for path in self.outputs.written(done.is_interrupted()) {
+            writeln!(out, "{}", path.display())?;
+        }
+        summarise(out, scene, &done.film, &done.report, done.cpu)
+    }
+}
+
+/// The attribute of complete images.
+const COMPLETE: &str = "smithwalk.complete";
+
+/// A hash of all that decides about a complete image.
+fn complete_mark(
+    identity: &Identity,
+    description: &Description,
+    settings: &RenderSettings,
+) -> String {
+    let RenderSettings {
+        window,
+        share,
+        limits,
+        ..
+    } = settings;
+    let all = format!(
+        "{identity:?} {:?} {window:?} {share:?} {limits:?}",
+        description.film
+    );
+    format!("{:032x}", xxh3_128(all.as_bytes()))
 }
 
 /// Puts what the command line says in place of what the file says.

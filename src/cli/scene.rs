@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use smithwalk::description::Description;
+use smithwalk::description::{Description, Frame};
 use smithwalk::memory::Budget;
-use smithwalk::scene::{RenderSettings, Resolved, resolve_within};
+use smithwalk::scene::{RenderSettings, ResolveError, Resolved, Stage, resolve_within};
 use smithwalk::text::bounded;
 
 /// In bytes; longer warnings are cut.
@@ -63,13 +63,44 @@ impl SceneArgs {
         film: u64,
         log: &mut dyn Write,
     ) -> anyhow::Result<Resolved> {
+        let resolve = |budget: &Budget| resolve_within(description, budget);
+        self.within(0, description, film, log, resolve)
+    }
+
+    /// As [`SceneArgs::resolve_beside`], the scene of a frame, with what the stage has of
+    /// others.
+    pub fn resolve_frame(
+        &self,
+        frame: &Frame,
+        stage: &mut Stage,
+        film: u64,
+        log: &mut dyn Write,
+    ) -> anyhow::Result<Resolved> {
+        let held = stage.memory();
+        let resolve = |budget: &Budget| stage.resolve(frame, budget);
+        self.within(held, &frame.description, film, log, resolve)
+    }
+
+    fn within(
+        &self,
+        held: u64,
+        description: &Description,
+        film: u64,
+        log: &mut dyn Write,
+        resolve: impl FnOnce(&Budget) -> Result<Resolved, ResolveError>,
+    ) -> anyhow::Result<Resolved> {
         let context = || format!("{} can't be rendered", self.scene.display());
-        let budget = self.memory.map_or_else(Budget::of_machine, Budget::new);
         let [width, height] = [description.film.width, description.film.height];
+        // What the machine has left is beside what this process holds.
+        let (budget, held) = match self.memory {
+            Some(limit) => (Budget::new(limit), held),
+            None => (Budget::of_machine(), 0),
+        };
         budget
-            .take(film, format!("a film of {width} × {height} pixels"))
+            .take(held, "what frames have in common")
+            .and_then(|()| budget.take(film, format!("a film of {width} × {height} pixels")))
             .with_context(context)?;
-        let resolved = resolve_within(description, &budget).with_context(context)?;
+        let resolved = resolve(&budget).with_context(context)?;
         for repair in &resolved.repairs {
             writeln!(log, "warning: {}", bounded(repair, MAX_WARNING))?;
         }

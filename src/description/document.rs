@@ -93,6 +93,10 @@ impl Mapping {
         }
     }
 
+    pub fn into_entries(self) -> Vec<(Key, Node)> {
+        self.entries
+    }
+
     pub fn node_mut(&mut self, position: usize) -> &mut Node {
         &mut self.entries[position].1
     }

@@ -3,6 +3,7 @@
 //! Names are still strings, angles still degrees and powers still watts; the
 //! format itself is described in `docs/scene-format.md`.
 
+mod animation;
 mod camera;
 mod document;
 mod layered;
@@ -21,6 +22,7 @@ mod validate;
 mod value;
 
 pub use crate::texture::{Channel, ColorSpace, Interpolation};
+pub use animation::{Animation, Changes, Frame};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
 };
@@ -38,9 +40,11 @@ pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
 pub use value::{Color, Scalar};
 
+use document::Node;
 use problem::Sources;
 
 use crate::memory::Budget;
+use crate::numbered::Numbered;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -101,6 +105,8 @@ pub struct Description {
     /// Lights other than emissive meshes.
     #[serde(default)]
     pub lights: Vec<Light>,
+    /// The files that say what is otherwise in each frame, relative to the scene file.
+    pub frames: Option<Numbered>,
     /// The directory that the file's relative paths start from.
     #[serde(skip)]
     pub directory: PathBuf,
@@ -115,31 +121,9 @@ impl Description {
     /// and references alike; files that the scene names are not opened.
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, Problems> {
         let name = path.display().to_string();
-        let whole = |message| Problems::new(vec![Problem::of_source(&name, message)]);
-        let cannot_read = |error| whole(format!("the scene can't be read: {error}"));
-        let mut file = crate::file::open(path).map_err(cannot_read)?;
-        let length = file.metadata().map_err(cannot_read)?.len();
-        Budget::of_machine()
-            .take(length.saturating_mul(MEMORY_PER_BYTE), "the scene file")
-            .map_err(|error| whole(error.to_string()))?;
-        let mut bytes = Vec::new();
-        std::io::Read::read_to_end(&mut file, &mut bytes).map_err(cannot_read)?;
-        for (beginning, found) in OTHER_FORMATS {
-            if bytes.starts_with(beginning) {
-                return Err(whole(format!("expected a scene in YAML, found {found}")));
-            }
-        }
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let valid = error.utf8_error().valid_up_to();
-            let line = error.as_bytes()[..valid]
-                .iter()
-                .filter(|&&byte| byte == b'\n')
-                .count()
-                + 1;
-            whole(format!("expected UTF-8, found other bytes in line {line}"))
-        })?;
+        let text = read_text(path, &name)?;
         let mut description = Self::from_str(&text, &name, overrides)?;
-        description.directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        description.directory = folder_of(path);
         Ok(description)
     }
 
@@ -152,22 +136,21 @@ impl Description {
         source_name: &str,
         overrides: &[(String, String)],
     ) -> Result<Self, Problems> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut sources = Sources::default();
-        let source = sources.add(source_name, text);
-        let tree = document::parse(text, source, 0, &mut sources);
-        let Some(mut tree) = tree else {
-            if sources.count() == 0 {
-                sources.report_whole(source, "the scene is empty");
-            }
+        let Some(mut tree) = tree_of(text, source_name, &mut sources) else {
             return Err(sources.into_problems());
         };
         for (path, value) in overrides {
             overrides::apply(&mut tree, path, value, &mut sources);
         }
-        let description = read::read::<Self>(&mut tree, &mut sources);
+        Self::from_tree(&mut tree, sources)
+    }
+
+    /// What the tree says, if nothing is wrong with it or was before.
+    fn from_tree(tree: &mut Node, mut sources: Sources<'_>) -> Result<Self, Problems> {
+        let description = read::read::<Self>(tree, &mut sources);
         if let Some(description) = &description {
-            validate::description(description, &tree, &mut sources);
+            validate::description(description, tree, &mut sources);
         }
         match description {
             Some(description) if sources.count() == 0 => Ok(description),
@@ -179,6 +162,54 @@ impl Description {
     pub fn resolve_path(&self, file: &Path) -> PathBuf {
         self.directory.join(file)
     }
+}
+
+/// The text of a scene file, or of one that belongs to it.
+fn read_text(path: &Path, name: &str) -> Result<String, Problems> {
+    let whole = |message| Problems::new(vec![Problem::of_source(name, message)]);
+    let cannot_read = |error| whole(format!("the scene can't be read: {error}"));
+    let mut file = crate::file::open(path).map_err(cannot_read)?;
+    let length = file.metadata().map_err(cannot_read)?.len();
+    Budget::of_machine()
+        .take(length.saturating_mul(MEMORY_PER_BYTE), "the scene file")
+        .map_err(|error| whole(error.to_string()))?;
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut file, &mut bytes).map_err(cannot_read)?;
+    for (beginning, found) in OTHER_FORMATS {
+        if bytes.starts_with(beginning) {
+            return Err(whole(format!("expected a scene in YAML, found {found}")));
+        }
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let line = error.as_bytes()[..valid]
+            .iter()
+            .filter(|&&byte| byte == b'\n')
+            .count()
+            + 1;
+        whole(format!("expected UTF-8, found other bytes in line {line}"))
+    })
+}
+
+/// Where the relative paths of a scene file start from.
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// A text without the byte order mark that some editors put before it.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// The tree of a scene's text; without one there is a problem.
+fn tree_of<'a>(text: &'a str, name: &str, sources: &mut Sources<'a>) -> Option<Node> {
+    let text = without_mark(text);
+    let source = sources.add(name, text);
+    let tree = document::parse(text, source, 0, sources);
+    if tree.is_none() && sources.count() == 0 {
+        sources.report_whole(source, "the scene is empty");
+    }
+    tree
 }
 
 impl Material {

@@ -1,4 +1,5 @@
-//! Values given on the command line as `path=value`.
+//! Values in place of a scene's, by their dotted path: on the command line as
+//! `path=value`, in the files of frames.
 
 use super::document::{Key, Kind, MAX_DEPTH, Mapping, Node, Scalar, dotted, parse};
 use super::problem::{Place, Sources, nearest};
@@ -8,21 +9,11 @@ use crate::text::excerpt;
 /// The sections whose keys are names that the file chooses.
 const NAMED: [&str; 3] = ["textures", "materials", "meshes"];
 
-/// Sets the value at a dotted path. Keys that the file leaves out are added,
-/// for whoever deserialises the tree to judge; names are not.
+/// Sets the value that the command line gives to a dotted path.
 pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sources<'_>) {
     let source = sources.add("-D", format!("{path}={value}"));
     let offset = path.chars().count() + 1;
     let place = Place::new(source, 1, 1, offset - 1);
-    if path.split('.').any(str::is_empty) {
-        sources.report(
-            place,
-            String::new(),
-            format!("expected keys joined by dots, found `{}`", excerpt(path)),
-            None,
-        );
-        return;
-    }
     let before = sources.count();
     let Some(node) = parse(value, source, offset, sources) else {
         if sources.count() == before {
@@ -35,6 +26,28 @@ pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sour
         }
         return;
     };
+    set(root, path, place, node, sources);
+}
+
+/// Sets the value at a dotted path, which stands at `place`. Keys that the file leaves
+/// out are added, for whoever deserialises the tree to judge; names are not. Gives the
+/// keys, indices and names that the path is made of; what is wrong with it is reported.
+pub(super) fn set(
+    root: &mut Node,
+    path: &str,
+    place: Place,
+    value: Node,
+    sources: &mut Sources<'_>,
+) -> Option<Vec<String>> {
+    if path.split('.').any(str::is_empty) {
+        sources.report(
+            place,
+            String::new(),
+            format!("expected keys joined by dots, found `{}`", excerpt(path)),
+            None,
+        );
+        return None;
+    }
     let mut segments: &[&str] = &path.split('.').collect::<Vec<_>>();
     let mut target = root;
     let mut walked = Vec::new();
@@ -42,7 +55,7 @@ pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sour
         if walked.len() == MAX_DEPTH {
             let message = format!("expected at most {MAX_DEPTH} keys joined by dots");
             sources.report(place, dotted(&walked), message, None);
-            return;
+            return None;
         }
         match step(target, segments, &walked, place) {
             Ok((next, taken)) => {
@@ -52,11 +65,12 @@ pub(super) fn apply(root: &mut Node, path: &str, value: &str, sources: &mut Sour
             }
             Err(Refusal { message, nearest }) => {
                 sources.report(place, dotted(&walked), message, nearest);
-                return;
+                return None;
             }
         }
     }
-    *target = node;
+    *target = value;
+    Some(walked)
 }
 
 struct Refusal {

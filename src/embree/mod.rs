@@ -19,4 +19,4 @@ pub use device::{Device, EmbreeError};
 pub use ray::{Hit, Ray};
 #[cfg(feature = "record-rays")]
 pub use record::{Query, recorded};
-pub use scene::{Accelerator, Geometry, SharedMesh, Vertices};
+pub use scene::{Accelerator, Geometry, SharedMesh, Structure, Vertices};

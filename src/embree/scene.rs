@@ -92,25 +92,90 @@ impl Drop for RawScene {
     }
 }
 
-/// A committed scene. Queries are read-only and thread safe.
+/// Vertices and triangles that instances share.
+pub type SharedMesh = (Arc<Vertices>, Arc<Vec<[u32; 3]>>);
+
+/// Triangles with their acceleration structure, for several accelerators to share.
 #[derive(Debug)]
-pub struct Accelerator {
-    root: RawScene,
-    /// Scenes that instances refer to, and the buffers that Embree reads in
-    /// place: kept for as long as the root scene is.
-    _shared: Vec<RawScene>,
+pub struct Structure {
+    scene: RawScene,
+    /// What Embree reads in place.
     _buffers: Vec<SharedMesh>,
-    device: Arc<Device>,
+    /// Released after the scene.
+    _device: Arc<Device>,
 }
 
 // SAFETY: Embree's queries on a committed scene are thread safe, nothing here
 // changes a scene after `build`, and the buffers are immutable behind `Arc`.
+unsafe impl Send for Structure {}
+// SAFETY: as above.
+unsafe impl Sync for Structure {}
+
+impl Structure {
+    /// Builds the structure of a mesh that instances place.
+    ///
+    /// # Errors
+    /// As [`Accelerator::build`].
+    pub fn of_mesh(device: &Arc<Device>, mesh: &SharedMesh) -> Result<Self, EmbreeError> {
+        Self::build(device, [(0, mesh.clone())])
+    }
+
+    /// Builds one structure over all of the geometries that are meshes; they keep
+    /// their numbers.
+    ///
+    /// # Errors
+    /// As [`Accelerator::build`].
+    pub fn of_meshes(device: &Arc<Device>, geometries: &[Geometry]) -> Result<Self, EmbreeError> {
+        let meshes = (0u32..).zip(geometries);
+        Self::build(
+            device,
+            meshes.filter_map(|(id, geometry)| match geometry {
+                Geometry::Mesh {
+                    vertices,
+                    triangles,
+                } => Some((id, (Arc::clone(vertices), Arc::clone(triangles)))),
+                Geometry::Instance { .. } => None,
+            }),
+        )
+    }
+
+    fn build(
+        device: &Arc<Device>,
+        meshes: impl IntoIterator<Item = (u32, SharedMesh)>,
+    ) -> Result<Self, EmbreeError> {
+        let scene = RawScene::new(device)?;
+        let mut buffers = Vec::new();
+        for (id, (vertices, triangles)) in meshes {
+            scene.attach(new_mesh(device, &vertices, &triangles)?, id);
+            buffers.push((vertices, triangles));
+        }
+        scene.commit(device)?;
+        Ok(Self {
+            scene,
+            _buffers: buffers,
+            _device: Arc::clone(device),
+        })
+    }
+}
+
+/// A committed scene. Queries are read-only and thread safe.
+#[derive(Debug)]
+pub struct Accelerator {
+    root: RawScene,
+    /// The number of the instance that holds meshes under their own numbers, if
+    /// there is one.
+    still: u32,
+    /// What the root scene refers to.
+    _shared: Vec<Arc<Structure>>,
+    /// What Embree reads in place.
+    _buffers: Vec<SharedMesh>,
+    device: Arc<Device>,
+}
+
+// SAFETY: as for `Structure`.
 unsafe impl Send for Accelerator {}
 // SAFETY: as above.
 unsafe impl Sync for Accelerator {}
-
-/// Vertices and triangles that instances share.
-pub type SharedMesh = (Arc<Vertices>, Arc<Vec<[u32; 3]>>);
 
 impl Accelerator {
     /// Builds the acceleration structures. `geometries[i]` answers as geometry
@@ -121,22 +186,37 @@ impl Accelerator {
     /// its device may hold.
     pub fn build(
         device: Arc<Device>,
-        shared: &[SharedMesh],
+        shared: Vec<Arc<Structure>>,
+        geometries: &[Geometry],
+    ) -> Result<Self, EmbreeError> {
+        Self::over(device, shared, None, geometries)
+    }
+
+    /// As [`Accelerator::build`], with the meshes among the geometries in a structure
+    /// of their own ([`Structure::of_meshes`]), which is there already.
+    ///
+    /// # Errors
+    /// As [`Accelerator::build`].
+    pub fn build_over(
+        device: Arc<Device>,
+        shared: Vec<Arc<Structure>>,
+        still: Arc<Structure>,
+        geometries: &[Geometry],
+    ) -> Result<Self, EmbreeError> {
+        Self::over(device, shared, Some(still), geometries)
+    }
+
+    fn over(
+        device: Arc<Device>,
+        mut shared: Vec<Arc<Structure>>,
+        still: Option<Arc<Structure>>,
         geometries: &[Geometry],
     ) -> Result<Self, EmbreeError> {
         let mut buffers = Vec::new();
-        let mut shared_scenes = Vec::with_capacity(shared.len());
-        for (vertices, triangles) in shared {
-            let scene = RawScene::new(&device)?;
-            let mesh = new_mesh(&device, vertices, triangles)?;
-            buffers.push((Arc::clone(vertices), Arc::clone(triangles)));
-            scene.attach(mesh, 0);
-            scene.commit(&device)?;
-            shared_scenes.push(scene);
-        }
         let root = RawScene::new(&device)?;
         for (id, geometry) in (0u32..).zip(geometries) {
             let raw = match geometry {
+                Geometry::Mesh { .. } if still.is_some() => continue,
                 Geometry::Mesh {
                     vertices,
                     triangles,
@@ -148,19 +228,27 @@ impl Accelerator {
                     shared: index,
                     to_world,
                 } => {
-                    let child = shared_scenes.get(*index).ok_or(EmbreeError::NoSuchMesh {
+                    let child = shared.get(*index).ok_or(EmbreeError::NoSuchMesh {
                         index: *index,
-                        meshes: shared_scenes.len(),
+                        meshes: shared.len(),
                     })?;
-                    new_instance(&device, child, to_world)
+                    new_instance(&device, &child.scene, to_world)
                 }
             };
             root.attach(raw, id);
         }
+        let mut number = sys::RTC_INVALID_GEOMETRY_ID;
+        if let Some(still) = still {
+            number = geometries.len() as u32;
+            let instance = new_instance(&device, &still.scene, &Affine3A::IDENTITY);
+            root.attach(instance, number);
+            shared.push(still);
+        }
         root.commit(&device)?;
         Ok(Self {
             root,
-            _shared: shared_scenes,
+            still: number,
+            _shared: shared,
             _buffers: buffers,
             device,
         })
@@ -184,8 +272,9 @@ impl Accelerator {
             return None;
         }
         // A shared mesh is geometry 0 of its own scene; the instance has the number.
+        // Without an instance, Embree's number for none is that of no `still` either.
         let instance = hit.hit.instID[0];
-        let geometry = if instance == sys::RTC_INVALID_GEOMETRY_ID {
+        let geometry = if instance == sys::RTC_INVALID_GEOMETRY_ID || instance == self.still {
             hit.hit.geomID
         } else {
             instance
@@ -327,13 +416,18 @@ mod tests {
         let (vertices, triangles) = unit_triangle();
         Accelerator::build(
             device(),
-            &[],
+            Vec::new(),
             &[Geometry::Mesh {
                 vertices,
                 triangles,
             }],
         )
         .expect("a valid mesh")
+    }
+
+    fn shared(device: &Arc<Device>) -> Arc<Structure> {
+        let structure = Structure::of_mesh(device, &unit_triangle());
+        Arc::new(structure.expect("a valid mesh"))
     }
 
     const DOWN: Vec3 = vec3(0.0, 0.0, -1.0);
@@ -349,7 +443,7 @@ mod tests {
         };
         let build = |limit| {
             let device = Device::with_limit(1, limit).expect("Embree is installed");
-            Accelerator::build(Arc::new(device), &[], std::slice::from_ref(&mesh))
+            Accelerator::build(Arc::new(device), Vec::new(), std::slice::from_ref(&mesh))
         };
         let needed = build(u64::MAX).expect("there is room").memory();
         assert!((300_000..5_000_000).contains(&needed), "{needed}");
@@ -386,10 +480,11 @@ mod tests {
     /// padding is needed, and it is enough.
     #[test]
     fn the_padding_takes_what_the_library_writes_past_the_record() {
-        let (vertices, triangles) = unit_triangle();
+        let device = device();
+        let shared = vec![shared(&device)];
         let scene = Accelerator::build(
-            device(),
-            &[(vertices, triangles)],
+            device,
+            shared,
             &[Geometry::Instance {
                 shared: 0,
                 to_world: Affine3A::IDENTITY,
@@ -411,13 +506,13 @@ mod tests {
 
     #[test]
     fn instances_answer_with_their_own_number_and_place() {
-        let shared = [unit_triangle()];
+        let device = device();
+        let shared = vec![shared(&device)];
         let place = |x| Geometry::Instance {
             shared: 0,
             to_world: Affine3A::from_translation(vec3(x, 0.0, 0.0)),
         };
-        let scene =
-            Accelerator::build(device(), &shared, &[place(0.0), place(5.0)]).expect("valid");
+        let scene = Accelerator::build(device, shared, &[place(0.0), place(5.0)]).expect("valid");
         let hit = scene
             .intersect(Ray::new(vec3(5.25, 0.25, 1.0), DOWN))
             .expect("the second one");
@@ -426,13 +521,49 @@ mod tests {
         assert_eq!((low, high), (Vec3::ZERO, vec3(6.0, 1.0, 0.0)));
     }
 
+    /// A mesh in the structure of what stands still answers with its own number beside
+    /// instances, and serves another accelerator afterwards.
+    #[test]
+    fn what_stands_still_keeps_its_numbers_and_its_structure() {
+        let device = device();
+        let (vertices, triangles) = unit_triangle();
+        let instance = |x| Geometry::Instance {
+            shared: 0,
+            to_world: Affine3A::from_translation(vec3(x, 0.0, 0.0)),
+        };
+        let mesh = Geometry::Mesh {
+            vertices,
+            triangles,
+        };
+        let shared = shared(&device);
+        let mut geometries = [instance(5.0), mesh, instance(3.0)];
+        let still = Structure::of_meshes(&device, &geometries).expect("valid");
+        let still = Arc::new(still);
+        for x in [5.0, 7.0] {
+            geometries[0] = instance(x);
+            let scene = Accelerator::build_over(
+                Arc::clone(&device),
+                vec![Arc::clone(&shared)],
+                Arc::clone(&still),
+                &geometries,
+            )
+            .expect("valid");
+            for (x, geometry) in [(0.0, 1), (x, 0), (3.0, 2)] {
+                let ray = Ray::new(vec3(x + 0.25, 0.25, 1.0), DOWN);
+                let hit = scene.intersect(ray).expect("above it");
+                assert_eq!((hit.geometry, hit.triangle), (geometry, 0));
+                assert!(scene.occluded(ray));
+            }
+        }
+    }
+
     #[test]
     fn an_index_out_of_range_is_an_error_and_never_reaches_the_library() {
         let (vertices, _) = unit_triangle();
         let triangles = Arc::new(vec![[0, 1, 2], [0, 1, 3]]);
         let error = Accelerator::build(
             device(),
-            &[],
+            Vec::new(),
             &[Geometry::Mesh {
                 vertices,
                 triangles,
@@ -447,7 +578,7 @@ mod tests {
 
     #[test]
     fn an_empty_scene_is_never_hit() {
-        let scene = Accelerator::build(device(), &[], &[]).expect("valid");
+        let scene = Accelerator::build(device(), Vec::new(), &[]).expect("valid");
         assert!(scene.intersect(Ray::new(Vec3::ZERO, DOWN)).is_none());
         assert!(scene.bounds().is_none());
     }

@@ -156,6 +156,17 @@ pub enum World {
     Environment(Box<Environment>),
 }
 
+impl World {
+    /// The bytes that its image and tables take.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        match self {
+            Self::Constant(_) => 0,
+            Self::Environment(image) => size_of::<Environment>() + image.bytes(),
+        }
+    }
+}
+
 /// Everything in the scene that shines.
 #[derive(Clone, Debug)]
 pub struct Lights {
@@ -265,6 +276,12 @@ impl Lights {
         &self.world
     }
 
+    /// The surroundings alone.
+    #[must_use]
+    pub fn into_surroundings(self) -> World {
+        self.world
+    }
+
     /// Whether any triangle shines.
     #[must_use]
     pub fn has_triangles(&self) -> bool {
@@ -274,13 +291,9 @@ impl Lights {
     /// What it takes, in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let world = match &self.world {
-            World::Constant(_) => 0,
-            World::Environment(image) => size_of::<Environment>() + image.bytes(),
-        };
         size_of::<Self>()
             + size_of_val(self.lamps.as_slice())
-            + world
+            + self.world.memory()
             + self.triangles.as_ref().map_or(0, Triangles::bytes)
             + self.chooser.as_ref().map_or(0, Chooser::bytes)
             + size_of_val(self.sized.as_slice())

@@ -1,6 +1,7 @@
 //! What decides about a render's samples: canonical values of the description, the
 //! contents of the files that it names, the program and the processor.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
@@ -16,8 +17,13 @@ use crate::mesh::Mesh as Triangles;
 /// as referred to.
 ///
 /// XXH3 is fast enough for gigabytes of textures, its results are specified to stay,
-/// and nobody gains by a collision.
-pub(super) fn identity(description: &Description, assets: &Assets) -> Identity {
+/// and nobody gains by a collision. `built` says how the scene is built, where that is
+/// otherwise than usual.
+pub(super) fn identity(
+    description: &Description,
+    contents: &Contents,
+    built: Option<String>,
+) -> Identity {
     let Description {
         version: _,
         light_units,
@@ -30,6 +36,7 @@ pub(super) fn identity(description: &Description, assets: &Assets) -> Identity {
         meshes: _,
         objects,
         lights,
+        frames: _,
         directory: _,
     } = description;
     let Film {
@@ -66,9 +73,10 @@ pub(super) fn identity(description: &Description, assets: &Assets) -> Identity {
     if let Some(World::Environment { file, .. }) = &mut surroundings {
         *file = PathBuf::new();
     }
-    let image = assets.environment.as_ref();
-    let image = image.map(|image| (image.width, of_floats(image.pixels.as_flattened())));
-    add("world".into(), of_value(&(surroundings, image)));
+    add(
+        "world".into(),
+        of_value(&(surroundings, contents.environment)),
+    );
     for (index, light) in lights.iter().enumerate() {
         add(format!("light {index}"), of_value(light));
     }
@@ -82,23 +90,53 @@ pub(super) fn identity(description: &Description, assets: &Assets) -> Identity {
         };
         add(format!("object {index}"), of_value(&object));
     }
-    for (name, mesh) in &assets.meshes {
-        let value = of_value(&of_mesh(mesh));
-        add(format!("mesh `{name}`"), value);
+    for (name, mesh) in &contents.meshes {
+        add(format!("mesh `{name}`"), mesh.clone());
     }
-    for name in assets.textures.keys() {
+    for (name, content) in &contents.textures {
         let Some(texture) = textures.get(name) else {
             continue;
         };
-        let content = std::fs::read(description.resolve_path(&texture.file));
         let described = Texture {
             file: PathBuf::new(),
             ..texture.clone()
         };
-        let content = content.ok().map(|bytes| xxh3_128(&bytes));
         add(format!("texture `{name}`"), of_value(&(described, content)));
     }
+    if let Some(built) = built {
+        add("frame".into(), of_value(&built));
+    }
     identity
+}
+
+/// Hashes of what is in the files that a description names.
+#[derive(Debug, Default)]
+pub(super) struct Contents {
+    /// By the names of meshes.
+    pub meshes: BTreeMap<String, String>,
+    /// By the names of textures; `None` where a file can't be read.
+    pub textures: BTreeMap<String, Option<u128>>,
+    /// The width of the world's image, and its pixels.
+    pub environment: Option<(usize, u128)>,
+}
+
+impl Contents {
+    pub fn of(description: &Description, assets: &Assets) -> Self {
+        let meshes = assets.meshes.iter();
+        let textures = assets.textures.keys().filter_map(|name| {
+            let file = &description.textures.get(name)?.file;
+            let bytes = std::fs::read(description.resolve_path(file)).ok();
+            Some((name.clone(), bytes.map(|bytes| xxh3_128(&bytes))))
+        });
+        let image = assets.environment.as_ref();
+        Self {
+            meshes: meshes
+                .map(|(name, mesh)| (name.clone(), of_value(&of_mesh(mesh))))
+                .collect(),
+            textures: textures.collect(),
+            environment: image.map(|image| (image.width, of_floats(image.pixels.as_flattened()))),
+        }
+    }
 }
 
 /// Of all fields; floats are written so that they come back with the same bits.

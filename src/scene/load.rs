@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::compile::Materials;
 use super::error::ResolveError;
+use super::stage::Stage;
 use crate::description::{Assignment, Description, Object, World};
 use crate::memory::Budget;
 use crate::mesh::{Mesh, Wanted};
@@ -26,20 +27,25 @@ pub struct Assets {
 }
 
 impl Assets {
-    /// Reads what the description's objects and world need, and nothing else; the
-    /// materials that objects may have are compiled for that.
+    /// Reads what the description's objects and world need and the stage does not have,
+    /// and nothing else; the materials that objects may have are compiled for that.
     ///
     /// # Errors
     /// Everything that could not be read, or for which the budget has no room.
-    pub fn load(
+    pub(super) fn load(
         description: &Description,
         materials: &mut Materials<'_>,
         budget: &Budget,
+        stage: &mut Stage,
     ) -> Result<Self, ResolveError> {
         let used = Used::by(description, materials);
+        stage.keep_meshes(used.keys(description, stage));
+        stage.keep_textures(description, materials.textures());
+        let stage = &*stage;
         let meshes: Vec<_> = used
             .meshes
             .par_iter()
+            .filter(|(name, _)| !stage.has_mesh(name))
             .filter_map(|(name, uvs)| {
                 let path = description.resolve_path(&description.meshes.get(name)?.file);
                 let wanted = Wanted {
@@ -59,6 +65,7 @@ impl Assets {
         let textures: Vec<_> = materials
             .textures()
             .par_iter()
+            .filter(|name| !stage.has_texture(name))
             .filter_map(|name| {
                 let texture = description.textures.get(name)?;
                 let path = description.resolve_path(&texture.file);
@@ -73,7 +80,7 @@ impl Assets {
             })
             .collect();
         let environment = match &description.world {
-            Some(World::Environment { file, .. }) => {
+            Some(World::Environment { file, .. }) if !stage.has_world() => {
                 let loaded = load_environment(&description.resolve_path(file), budget);
                 Some(loaded.map_err(|e| e.to_string()))
             }
@@ -145,6 +152,18 @@ impl Used {
             *used.meshes.entry(object.mesh.clone()).or_default() |= uvs;
         }
         used
+    }
+
+    /// What each mesh is kept under.
+    fn keys(&self, description: &Description, stage: &Stage) -> BTreeMap<String, String> {
+        let places = stage.places(description);
+        let meshes = self.meshes.iter().filter_map(|(name, used)| {
+            let file = &description.meshes.get(name)?.file;
+            let content = format!("{name:?} {file:?} {used:?}");
+            let place = places.get(name.as_str()).and_then(Option::as_ref);
+            Some((name.clone(), Stage::key(&content, place)))
+        });
+        meshes.collect()
     }
 }
 

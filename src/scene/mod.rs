@@ -8,6 +8,7 @@ mod load;
 mod material;
 mod resolve;
 mod settings;
+mod stage;
 mod surface;
 mod transform;
 
@@ -20,6 +21,7 @@ pub use material::{
 };
 pub use resolve::{Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
+pub use stage::Stage;
 pub use surface::{Surface, View};
 pub use transform::{euler, to_affine};
 
@@ -50,6 +52,18 @@ pub struct SceneMesh {
     /// For each triangle, which of the object's materials it has; all have the
     /// first without it.
     pub slots: Option<Vec<u16>>,
+}
+
+impl SceneMesh {
+    /// The bytes that its vertices and triangles take.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        size_of_val(&**self.vertices)
+            + size_of_val(&**self.triangles)
+            + self.normals.as_deref().map_or(0, size_of_val)
+            + self.uvs.as_deref().map_or(0, size_of_val)
+            + self.slots.as_deref().map_or(0, size_of_val)
+    }
 }
 
 /// Something to be seen.

@@ -7,14 +7,15 @@ use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::compile::Materials;
 use super::error::ResolveError;
-use super::identity::identity;
+use super::identity::{Contents, identity};
 use super::load::Assets;
+use super::stage::{KeptMesh, Lent, Stage};
 use super::transform::to_affine;
 use super::{Material, Object, RenderSettings, Scene, SceneMesh};
 use crate::camera::Camera;
 use crate::color::Rgb;
 use crate::description::{Assignment, Description, Transform};
-use crate::embree::{Accelerator, Device, Geometry, SharedMesh};
+use crate::embree::{Accelerator, Geometry};
 use crate::features::Features;
 use crate::film::Identity;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
@@ -51,9 +52,10 @@ pub fn resolve_within(
     description: &Description,
     budget: &Budget,
 ) -> Result<Resolved, ResolveError> {
+    let mut stage = Stage::default();
     let mut materials = Materials::of(description);
-    let assets = Assets::load(description, &mut materials, budget)?;
-    build(description, assets, materials, budget)
+    let assets = Assets::load(description, &mut materials, budget, &mut stage)?;
+    build(description, assets, materials, budget, &mut stage)
 }
 
 /// Builds the scene from a description and the contents of its files.
@@ -65,16 +67,26 @@ pub fn assemble(
     assets: Assets,
     budget: &Budget,
 ) -> Result<Resolved, ResolveError> {
-    build(description, assets, Materials::of(description), budget)
+    let materials = Materials::of(description);
+    build(
+        description,
+        assets,
+        materials,
+        budget,
+        &mut Stage::default(),
+    )
 }
 
-fn build(
+pub(super) fn build(
     description: &Description,
     assets: Assets,
     materials: Materials<'_>,
     budget: &Budget,
+    stage: &mut Stage,
 ) -> Result<Resolved, ResolveError> {
-    let identity = identity(description, &assets);
+    let mut contents = Contents::of(description, &assets);
+    stage.complete(&mut contents);
+    let identity = identity(description, &contents, stage.identity());
     let mut problems = Vec::new();
     let Assets {
         meshes,
@@ -84,13 +96,13 @@ fn build(
     } = assets;
 
     let mut materials = MaterialTable::new(materials);
-    let origin = origin(description);
+    let origin = stage.origin(description);
     let at = |transform: &Transform| {
         let mut to_world = to_affine(transform);
         to_world.translation -= origin;
         to_world
     };
-    let mut placing = Placing::new(description, meshes);
+    let mut placing = Placing::new(description, meshes, &contents);
     let mut objects = Vec::new();
     let mut geometries = Vec::new();
     for (index, object) in description.objects.iter().enumerate() {
@@ -98,7 +110,9 @@ fn build(
             .name
             .clone()
             .unwrap_or_else(|| format!("objects.{index}"));
-        let result = placing.place(object, &name, at(&object.transform), &mut materials);
+        let alone = placing.is_alone(object) && !stage.moves(index, &object.mesh);
+        let place = at(&object.transform);
+        let result = placing.place(object, &name, place, alone, &mut materials, stage);
         match result {
             Ok((object, geometry)) => {
                 objects.push(object);
@@ -118,13 +132,14 @@ fn build(
     repairs.append(&mut notes);
     let mut textures: Vec<Texture> = Vec::new();
     for name in source.textures() {
-        match loaded.remove(name) {
+        match loaded.remove(name).or_else(|| stage.texture(name)) {
             Some(texture) => textures.push(texture),
             None => problems.push(format!("the texture `{name}` is missing")),
         }
     }
     let Placing {
         scene_meshes,
+        lent,
         shared,
         ..
     } = placing;
@@ -147,13 +162,16 @@ fn build(
         }
     }
     // The image was read with the other files; a world without one has none.
-    let world = match &description.world {
-        None => World::Constant(Rgb::ZERO),
-        Some(world) => resolve_world(world, |_| environment.ok_or("the world's image is missing"))
-            .unwrap_or_else(|error| {
-                problems.push(format!("world: {error}"));
-                World::Constant(Rgb::ZERO)
-            }),
+    let world = match (stage.take_world(), &description.world) {
+        (Some(world), _) => world,
+        (None, None) => World::Constant(Rgb::ZERO),
+        (None, Some(world)) => {
+            resolve_world(world, |_| environment.ok_or("the world's image is missing"))
+                .unwrap_or_else(|error| {
+                    problems.push(format!("world: {error}"));
+                    World::Constant(Rgb::ZERO)
+                })
+        }
     };
     if !problems.is_empty() {
         return Err(ResolveError { problems });
@@ -174,13 +192,26 @@ fn build(
     if !problems.is_empty() {
         return Err(ResolveError { problems });
     }
-    let build = || -> Result<Accelerator, crate::embree::EmbreeError> {
-        let device = Device::with_limit(0, budget.left())?;
-        Accelerator::build(Arc::new(device), &shared, &geometries)
+    let mut build = || -> Result<Accelerator, crate::embree::EmbreeError> {
+        let device = stage.device(budget)?;
+        let shared = shared.iter().map(|&index| {
+            let mesh = &scene_meshes[index];
+            let mesh = (Arc::clone(&mesh.vertices), Arc::clone(&mesh.triangles));
+            stage.structure(&device, &lent[index].key, &mesh)
+        });
+        let shared = shared.collect::<Result<Vec<_>, _>>()?;
+        let key = |object: usize| lent[objects[object].mesh].key.as_str();
+        match stage.still(&device, &geometries, key)? {
+            Some(still) => Accelerator::build_over(device, shared, still, &geometries),
+            None => Accelerator::build(device, shared, &geometries),
+        }
     };
     let accelerator = build().map_err(|e| ResolveError {
         problems: vec![e.to_string()],
     })?;
+    let names = source.textures().iter().cloned();
+    let used = names.zip(textures.iter().cloned());
+    stage.lend(description, lent, used, &contents);
     let lights = Lights::new(lamps, world, triangles);
     let mut scene = Scene {
         accelerator,
@@ -252,29 +283,44 @@ impl<'a> MaterialTable<'a> {
 
 /// Puts meshes where objects are: into world space when one object alone uses
 /// the mesh, else once in their own space, to be instanced.
-struct Placing {
+struct Placing<'a> {
     meshes: BTreeMap<String, Mesh>,
+    contents: &'a Contents,
     users: BTreeMap<String, usize>,
     scene_meshes: Vec<SceneMesh>,
+    /// What the stage remembers of each of them.
+    lent: Vec<Lent>,
     /// For instanced meshes: index into `scene_meshes` and into `shared`, and
     /// the names of the material slots.
     placed: BTreeMap<String, (usize, usize, Vec<String>)>,
-    shared: Vec<SharedMesh>,
+    /// Indices into `scene_meshes`.
+    shared: Vec<usize>,
 }
 
-impl Placing {
-    fn new(description: &Description, meshes: BTreeMap<String, Mesh>) -> Self {
+impl<'a> Placing<'a> {
+    fn new(
+        description: &Description,
+        meshes: BTreeMap<String, Mesh>,
+        contents: &'a Contents,
+    ) -> Self {
         let mut users = BTreeMap::new();
         for object in &description.objects {
             *users.entry(object.mesh.clone()).or_default() += 1;
         }
         Self {
             meshes,
+            contents,
             users,
             scene_meshes: Vec::new(),
+            lent: Vec::new(),
             placed: BTreeMap::new(),
             shared: Vec::new(),
         }
+    }
+
+    /// Whether no other object uses its mesh.
+    fn is_alone(&self, object: &crate::description::Object) -> bool {
+        self.users.get(&object.mesh) == Some(&1)
     }
 
     fn place(
@@ -282,7 +328,9 @@ impl Placing {
         object: &crate::description::Object,
         name: &str,
         to_world: Affine3A,
+        alone: bool,
         materials: &mut MaterialTable<'_>,
+        stage: &mut Stage,
     ) -> Result<(Object, Geometry), String> {
         let linear = Mat3::from(to_world.matrix3);
         let determinant = linear.as_dmat3().determinant();
@@ -290,23 +338,35 @@ impl Placing {
             return Err(format!("{name}: the transform flattens the object"));
         }
         let normal_to_world = Mat3A::from(linear.as_dmat3().inverse().transpose().as_mat3());
-        let alone = self.users.get(&object.mesh) == Some(&1);
         if let std::collections::btree_map::Entry::Vacant(entry) =
             self.placed.entry(object.mesh.clone())
         {
-            let mesh = self
-                .meshes
-                .remove(&object.mesh)
-                .ok_or_else(|| format!("{name}: there is no mesh `{}`", object.mesh))?;
-            let slots = mesh.material_names.clone();
-            let scene_mesh = scene_mesh(mesh, alone.then_some((&to_world, &normal_to_world)));
+            let KeptMesh { mesh, lent } = match stage.take_mesh(&object.mesh) {
+                Some(kept) => kept,
+                None => {
+                    let mesh = self
+                        .meshes
+                        .remove(&object.mesh)
+                        .ok_or_else(|| format!("{name}: there is no mesh `{}`", object.mesh))?;
+                    let content = self.contents.meshes.get(&object.mesh);
+                    let lent = Lent {
+                        key: stage.key_of(&object.mesh),
+                        slots: mesh.material_names.clone(),
+                        content: content.cloned().unwrap_or_default(),
+                    };
+                    let place = alone.then_some((&to_world, &normal_to_world));
+                    KeptMesh {
+                        mesh: scene_mesh(mesh, place),
+                        lent,
+                    }
+                }
+            };
+            let slots = lent.slots.clone();
             if !alone {
-                self.shared.push((
-                    Arc::clone(&scene_mesh.vertices),
-                    Arc::clone(&scene_mesh.triangles),
-                ));
+                self.shared.push(self.scene_meshes.len());
             }
-            self.scene_meshes.push(scene_mesh);
+            self.lent.push(lent);
+            self.scene_meshes.push(mesh);
             entry.insert((
                 self.scene_meshes.len() - 1,
                 self.shared.len().wrapping_sub(1),
@@ -378,23 +438,6 @@ fn assign(
             .iter()
             .map(|slot| find(slot, ", which the mesh's usemtl line asks for"))
             .collect(),
-    }
-}
-
-/// The largest coordinate of a camera, in metres, up to which the scene keeps
-/// the file's origin: there `f32` still resolves a tenth of a millimetre.
-const NEAR_ORIGIN: f32 = 1024.0;
-
-/// What the file's coordinates are counted from. Positions in `f32` are as
-/// coarse as they are far from the origin, and rays start off surfaces by a
-/// multiple of that; so a scene that is far away is moved to its camera.
-fn origin(description: &Description) -> Vec3A {
-    let camera = description.camera.as_ref();
-    let position = camera.map_or(Vec3A::ZERO, |c| to_affine(&c.transform).translation);
-    if position.is_finite() && position.abs().max_element() > NEAR_ORIGIN {
-        position
-    } else {
-        Vec3A::ZERO
     }
 }
 

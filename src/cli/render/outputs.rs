@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use smithwalk::film::{Film, Identity, sidecar_path};
-use smithwalk::image::{OutputPath, check_output};
+use smithwalk::image::{OutputPath, check_output, read_exr};
+use smithwalk::numbered::Numbered;
 
-use super::Part;
+use super::{Args, COMPLETE};
 
 /// Where image and film go.
 pub struct Outputs {
@@ -19,21 +20,31 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The files that were asked for, or else those named like the scene.
-    pub fn new(
-        scene: &Path,
-        asked: &[PathBuf],
-        part: Option<Part>,
-        resume: bool,
-    ) -> anyhow::Result<Self> {
-        let stem = PathBuf::from(scene.file_stem().context("the scene file has no name")?);
-        let paths = match part {
-            _ if !asked.is_empty() => asked.to_vec(),
-            Some(part) => {
+    /// The files that were asked for, or else those named like the scene; of a frame,
+    /// those with its number.
+    pub fn new(args: &Args, frame: Option<i32>) -> anyhow::Result<Self> {
+        let scene = &args.scene.scene;
+        let mut stem = scene
+            .file_stem()
+            .context("the scene file has no name")?
+            .to_owned();
+        if let Some(frame) = frame {
+            stem.push("_");
+            stem.push(Numbered::new("####")?.at(frame));
+        }
+        let stem = PathBuf::from(stem);
+        let paths = match (args.part, frame) {
+            (_, Some(frame)) if !args.output.is_empty() => {
+                let only = args.frames.as_ref().is_some_and(|f| f.start() == f.end());
+                let paths = args.output.iter().map(|path| numbered(path, frame, only));
+                paths.collect::<anyhow::Result<_>>()?
+            }
+            _ if !args.output.is_empty() => args.output.clone(),
+            (Some(part), _) => {
                 let kind = format!("{}-of-{}.film", part.index, part.count);
                 vec![stem.with_extension(kind)]
             }
-            None => ["exr", "png"].map(|kind| stem.with_extension(kind)).into(),
+            (None, _) => ["exr", "png"].map(|kind| stem.with_extension(kind)).into(),
         };
         let is_film = |path: &PathBuf| path.extension().is_some_and(|kind| kind == "film");
         let (films, images): (Vec<_>, Vec<_>) = paths.into_iter().partition(is_film);
@@ -49,7 +60,9 @@ impl Outputs {
             image.check()?;
         }
         let named = films.into_iter().next();
-        let keep = named.is_some() || part.is_some() || resume;
+        // Of a frame, the image says that it is complete.
+        let resume = args.resume && frame.is_none();
+        let keep = named.is_some() || args.part.is_some() || resume;
         let film = match (named, images.first()) {
             (Some(film), _) => film,
             (None, Some(image)) => sidecar_path(image.path()),
@@ -57,6 +70,20 @@ impl Outputs {
         };
         check_output(&film)?;
         Ok(Self { images, film, keep })
+    }
+
+    /// Whether all images are there, and one of them says that it is complete by this
+    /// mark. A film that is there is of an interrupted render.
+    pub fn are_complete(&self, mark: &str) -> bool {
+        let says_so = |output: &OutputPath| {
+            let path = output.path();
+            path.extension().is_some_and(|kind| kind == "exr")
+                && read_exr(path).is_ok_and(|image| image.attribute(COMPLETE) == Some(mark))
+        };
+        !self.keep
+            && !self.film.exists()
+            && self.images.iter().all(|output| output.path().exists())
+            && self.images.iter().any(says_so)
     }
 
     /// Saves the film if it is to stay, and else removes what checkpoints or an earlier
@@ -95,5 +122,18 @@ impl Outputs {
     pub fn written(&self, interrupted: bool) -> impl Iterator<Item = &Path> {
         let film = self.stays(interrupted).then_some(self.film.as_path());
         self.images.iter().map(OutputPath::path).chain(film)
+    }
+}
+
+/// The name of a frame's file; one without a place for the number does for the only
+/// frame.
+fn numbered(path: &Path, frame: i32, only: bool) -> anyhow::Result<PathBuf> {
+    let name = path
+        .to_str()
+        .context("expected the name of an output in UTF-8")?;
+    match Numbered::new(name) {
+        Ok(name) => Ok(name.at(frame)),
+        Err(_) if only => Ok(path.to_owned()),
+        Err(error) => Err(error).context("several frames can't be written to one file"),
     }
 }

@@ -22,6 +22,8 @@ pub enum ProgressKind {
 pub struct Reporter {
     kind: ProgressKind,
     limits: Limits,
+    /// The number of the frame in an animation.
+    frame: Option<i32>,
     bar: ProgressBar,
     start: Instant,
     latest: Mutex<Latest>,
@@ -38,7 +40,7 @@ struct Latest {
 }
 
 impl Reporter {
-    pub fn new(kind: ProgressKind, limits: &Limits) -> Self {
+    pub fn new(kind: ProgressKind, limits: &Limits, frame: Option<i32>) -> Self {
         let bar = match limits.time {
             Some(time) => ProgressBar::new(time.as_millis() as u64),
             None => ProgressBar::new(u64::from(limits.spp)),
@@ -51,6 +53,7 @@ impl Reporter {
         Self {
             kind,
             limits: *limits,
+            frame,
             bar: bar.with_style(style),
             start: Instant::now(),
             latest: Mutex::default(),
@@ -59,7 +62,10 @@ impl Reporter {
 
     /// Tells how far it is; may be called by any thread.
     pub fn show(&self, progress: Progress) {
-        self.bar.set_message(format!("{:.0} spp", progress.spp));
+        let frame = self.frame.map(|frame| format!("frame {frame}, "));
+        let frame = frame.unwrap_or_default();
+        self.bar
+            .set_message(format!("{frame}{:.0} spp", progress.spp));
         self.bar.set_position(match self.limits.time {
             Some(_) => progress.elapsed.as_millis() as u64,
             None => progress.spp as u64,
@@ -87,7 +93,7 @@ impl Reporter {
             (a, b) => a.or(b),
         };
         let rounded = |value: f64| (value * 1000.0).round() / 1000.0;
-        let line = json!({
+        let mut line = json!({
             "spp": rounded(progress.spp),
             "target": progress.target,
             "elapsed": rounded(elapsed),
@@ -95,6 +101,9 @@ impl Reporter {
             "noise": latest.noise,
             "checkpoint": latest.checkpoint.map(|at| rounded(at.as_secs_f64())),
         });
+        if let Some(frame) = self.frame {
+            line["frame"] = frame.into();
+        }
         // Nobody has to listen.
         let _ = writeln!(std::io::stderr(), "{line}");
     }

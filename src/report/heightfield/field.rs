@@ -138,7 +138,7 @@ impl Patch {
             triangles: Arc::clone(&triangles),
         };
         Ok(Self {
-            accelerator: Accelerator::build(Arc::clone(device), &[], &[mesh])?,
+            accelerator: Accelerator::build(Arc::clone(device), Vec::new(), &[mesh])?,
             vertices,
             triangles,
             half: 0.5 * period,
