@@ -435,9 +435,8 @@ class _Surface:
         if self.graph.view(node).distribution == "ASHIKHMIN":
             return {"velvet": {"color": self.color(node, "Color", groups),
                                "sigma": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
-        self.warn("is not rendered yet: written as diffuse", node)
-        self.idle(node, "Roughness")
-        return {"diffuse": {"color": self.color(node, "Color", groups)}}
+        return {"sheen": {"color": self.color(node, "Color", groups),
+                          "roughness": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
 
     def subsurface(self, node, groups):
         """Subsurface Scattering: light that comes out where it went in."""
@@ -534,8 +533,6 @@ class _Surface:
         if any(keys.get(k) for k in ("subsurface", "subsurface_weight")):
             self.warn("subsurface light comes out where it went in", node)
             self.idle(node, *_IDLE["Subsurface"], *_IDLE["Subsurface Weight"])
-        if keys.get("sheen_weight"):
-            self.warn("its sheen is not rendered yet", node)
         keys.setdefault("base_color", 0.8)
         return {"principled": keys}
 

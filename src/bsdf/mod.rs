@@ -35,6 +35,7 @@ mod mirror;
 mod mixture;
 mod rise;
 mod rough;
+mod sheen;
 mod stack;
 mod table;
 
@@ -50,6 +51,7 @@ pub use mirror::Mirror;
 pub use mixture::{Bsdf, InLanes, MAX_CLOSURES, ScatterSample, WeightedClosure};
 pub use rise::Rises;
 pub use rough::{Method, Rough};
+pub use sheen::Sheen;
 pub use stack::Stack;
 pub use table::{ByFacets, Distribution, FacetKind, Listed, RoughClosure, Width, WidthInLanes};
 

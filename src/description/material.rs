@@ -1,6 +1,7 @@
 //! Materials.
 
 use super::layered::Layered;
+use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
 use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness};
 use super::validate::{At, Check, Range};
@@ -42,6 +43,9 @@ pub enum Material {
     Layered(Layered),
     /// Blender's node.
     Principled(Box<Principled>),
+    /// OpenPBR's surface.
+    #[serde(rename = "openpbr")]
+    OpenPbr(Box<OpenPbr>),
 }
 
 /// A rough metal.
@@ -535,6 +539,7 @@ impl Material {
             }
             Self::Layered(layered) => layered.check(check, &at.key("layered")),
             Self::Principled(principled) => principled.check(check, &at.key("principled")),
+            Self::OpenPbr(surface) => surface.check(check, &at.key("openpbr")),
         }
     }
 

@@ -11,6 +11,7 @@ mod light;
 mod material;
 mod mixes;
 mod node;
+mod openpbr;
 mod overrides;
 mod principled;
 mod problem;
@@ -33,7 +34,8 @@ pub use material::{
     Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,
     Reflectance, RoughDiffuse, Sheen, Sum, Velvet,
 };
-pub use principled::{Principled, Principled3, Principled4, Sockets, Version};
+pub use openpbr::OpenPbr;
+pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Version};
 pub use problem::{Problem, Problems};
 pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};

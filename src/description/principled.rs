@@ -37,6 +37,8 @@ pub enum Layering {
     /// By the layer's albedo towards the viewer, as in Cycles.
     #[default]
     Cycles,
+    /// As it comes of light that walks among the layers.
+    Walks,
 }
 
 /// How facets scatter, as the node has it.

@@ -2,6 +2,7 @@
 //! needs: names become indices, mixes flat lists, the estimator is chosen.
 
 mod layered;
+mod openpbr;
 mod principled;
 #[cfg(test)]
 mod tests;
@@ -32,9 +33,6 @@ pub enum MaterialError {
     /// A name that is not among the textures.
     #[error("there is no texture `{0}`")]
     UnknownTexture(String),
-    /// A kind that the format has and the renderer not.
-    #[error("`{0}` can't be rendered yet")]
-    Unknown(&'static str),
     /// A textured index of refraction where a table is made for each.
     #[error("the estimator `compensated` takes no texture for `ior`")]
     TexturedIndex,
@@ -122,6 +120,7 @@ impl<'a> Materials<'a> {
             needs: Needs::default(),
             leaves: Vec::new(),
             closures: 0,
+            lookups: 0,
         };
         let result = compiler.add(material, &Above::default());
         self.textures = std::mem::take(&mut compiler.textures);
@@ -148,6 +147,7 @@ pub fn compile_alone(
         needs: Needs::default(),
         leaves: Vec::new(),
         closures: 0,
+        lookups: 0,
     };
     compiler.add(material, &Above::default())?;
     Ok(compiler.finish().material)
@@ -194,6 +194,8 @@ struct Compiler<'a> {
     leaves: Vec<WeightedLeaf>,
     /// How many closures the leaves come to at the most.
     closures: usize,
+    /// How often a texture has been asked for.
+    lookups: usize,
 }
 
 impl<'a> Compiler<'a> {
@@ -267,9 +269,13 @@ impl<'a> Compiler<'a> {
                 self.need_if(Features::DIFFUSERS, true);
                 Leaf::Velvet(self.tint(&velvet.color)?, self.number(&velvet.sigma)?)
             }
-            desc::Material::Sheen(_) => return Err(MaterialError::Unknown("sheen")),
+            desc::Material::Sheen(sheen) => {
+                self.need_if(Features::DIFFUSERS, true);
+                Leaf::Sheen(self.tint(&sheen.color)?, self.number(&sheen.roughness)?)
+            }
             desc::Material::Layered(layered) => self.layered(layered)?,
             desc::Material::Principled(node) => self.principled(node)?,
+            desc::Material::OpenPbr(surface) => self.openpbr(surface)?,
             desc::Material::Emission(emission) => Leaf::Emission(
                 self.tint(&emission.color)?,
                 self.number(&emission.strength)?,
@@ -316,6 +322,7 @@ impl<'a> Compiler<'a> {
             return Err(MaterialError::UnknownTexture(name.to_owned()));
         }
         self.needs.uvs = true;
+        self.lookups += 1;
         if let Some(index) = self.textures.iter().position(|known| known == name) {
             return Ok(index);
         }

@@ -43,18 +43,23 @@ impl Compiler<'_> {
         let layers = Layers { interfaces, base };
         let tangent = self.tangent(layered.tangent, layers.is_isotropic());
         let open = matches!(layers.base, BaseLayer::Open);
-        self.need_if(Features::LAYERS.with(Features::MULTIPLE_SCATTERING), true);
+        self.need_walks();
         self.need_if(Features::TRANSMISSION, open);
+        let rotation = self.number(&layered.rotation)?;
+        let material = LayeredMaterial::new(layers, rotation, tangent)
+            .map_err(|error| MaterialError::Stack(error.to_string()))?;
+        Ok(Leaf::Layered(Box::new(material)))
+    }
+
+    /// What stacks need.
+    pub(super) fn need_walks(&mut self) {
+        self.need_if(Features::LAYERS.with(Features::MULTIPLE_SCATTERING), true);
         if matches!(
             self.estimator,
             desc::Estimator::Single | desc::Estimator::Compensated
         ) {
             self.note("layers are by walks, whatever the estimator");
         }
-        let rotation = self.number(&layered.rotation)?;
-        let material = LayeredMaterial::new(layers, rotation, tangent)
-            .map_err(|error| MaterialError::Stack(error.to_string()))?;
-        Ok(Leaf::Layered(Box::new(material)))
     }
 
     fn base(

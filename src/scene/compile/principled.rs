@@ -1,7 +1,7 @@
 //! Compiles Blender's Principled BSDF.
 
 use super::super::material::{
-    Facet, Leaf, Number, Principled3, Principled4, Reflectance, Setup, Tint,
+    Facet, Layering, Leaf, Number, Principled3, Principled4, Reflectance, Setup, Tint,
 };
 use super::{Compiler, MaterialError};
 use crate::bsdf::{Distribution, Method, Rises};
@@ -17,10 +17,21 @@ impl Compiler<'_> {
                 .with(Features::METALS),
             true,
         );
-        match &node.sockets {
-            desc::Sockets::V3(sockets) => self.principled3(node, sockets),
-            desc::Sockets::V4(sockets) => self.principled4(node, sockets),
+        let lookups = self.lookups;
+        let mut leaf = match &node.sockets {
+            desc::Sockets::V3(sockets) => self.principled3(node, sockets)?,
+            desc::Sockets::V4(sockets) => self.principled4(node, sockets)?,
+        };
+        if node.layering == desc::Layering::Walks {
+            self.need_walks();
+            let layering = Layering::walks(self.lookups == lookups);
+            match &mut leaf {
+                Leaf::Principled3(node) => node.setup.layering = layering,
+                Leaf::Principled4(node) => node.setup.layering = layering,
+                _ => {}
+            }
         }
+        Ok(leaf)
     }
 
     /// What both nodes share; `glass` is how the facets of glass scatter.
@@ -32,8 +43,29 @@ impl Compiler<'_> {
         ior: Number,
         transmits: bool,
     ) -> Result<Setup, MaterialError> {
+        let multiple = node.multiple || node.layering == desc::Layering::Walks;
+        self.setup_of(
+            node.tangent,
+            isotropic,
+            (!multiple).then_some(once),
+            ior,
+            transmits,
+        )
+    }
+
+    /// How the facets of a node scatter: all orders, or `once`.
+    pub(super) fn setup_of(
+        &mut self,
+        tangent: desc::Tangent,
+        isotropic: bool,
+        once: Option<Method>,
+        ior: Number,
+        transmits: bool,
+    ) -> Result<Setup, MaterialError> {
         let white = Tint::Constant(Rgb::ONE);
-        let (reflecting, glass) = if node.multiple {
+        let (reflecting, glass) = if let Some(once) = once {
+            (once, None)
+        } else {
             let method = |facet| self.method(desc::Scattering::Multiple, Distribution::Ggx, facet);
             let reflecting = method(Facet::Metal(Reflectance::Constant(white)))?;
             let glass = if transmits {
@@ -42,8 +74,6 @@ impl Compiler<'_> {
                 Method::Single
             };
             (reflecting, Some(glass))
-        } else {
-            (once, None)
         };
         self.need_if(Features::MULTIPLE_SCATTERING, reflecting.is_multiple());
         self.need_if(
@@ -51,10 +81,11 @@ impl Compiler<'_> {
             transmits,
         );
         Ok(Setup {
-            tangent: self.tangent(node.tangent, isotropic),
+            tangent: self.tangent(tangent, isotropic),
             reflecting,
             glass,
             rises: Rises::of_ggx(),
+            layering: Layering::Cycles,
         })
     }
 
@@ -70,6 +101,13 @@ impl Compiler<'_> {
         let ior = self.number(&sockets.ior)?;
         let transmission = self.number(&sockets.transmission)?;
         let subsurface = self.number(&sockets.subsurface)?;
+        if node.layering == desc::Layering::Walks {
+            if sockets.transmission_roughness != desc::Scalar::Value(0.0) {
+                self.note(
+                    "by walks an interface has one roughness: transmission_roughness is left out",
+                );
+            }
+        }
         if !subsurface.is(0.0) {
             self.note("subsurface scattering is a diffuse base of the same colour");
         }
@@ -114,13 +152,17 @@ impl Compiler<'_> {
         let ior = self.number(&sockets.ior)?;
         let transmission_weight = self.number(&sockets.transmission_weight)?;
         let diffuse_roughness = self.number(&sockets.diffuse_roughness)?;
-        self.need_if(Features::DIFFUSERS, !diffuse_roughness.is(0.0));
+        let facets = Features::DIFFUSE_FACETS.with(Features::BECKMANN);
+        let rough = match node.layering {
+            desc::Layering::Cycles => Features::DIFFUSERS,
+            desc::Layering::Walks => facets,
+        };
+        self.need_if(rough, !diffuse_roughness.is(0.0));
         if sockets.subsurface_weight != desc::Scalar::Value(0.0) {
             self.note("subsurface scattering is a diffuse base of the same colour");
         }
-        if sockets.sheen_weight != desc::Scalar::Value(0.0) {
-            self.note("the sheen of Cycles 4 and later is left out");
-        }
+        let sheen_weight = self.number(&sockets.sheen_weight)?;
+        self.need_if(Features::DIFFUSERS, !sheen_weight.is(0.0));
         let transmits = !transmission_weight.is(0.0);
         let setup = self.setup(node, anisotropic.is(0.0), Method::Single, ior, transmits)?;
         let leaf = Principled4 {
@@ -140,11 +182,14 @@ impl Compiler<'_> {
             coat_roughness: self.number(&sockets.coat_roughness)?,
             coat_ior: self.number(&sockets.coat_ior)?,
             coat_tint: self.tint(&sockets.coat_tint)?,
+            sheen_weight,
+            sheen_roughness: self.number(&sockets.sheen_roughness)?,
+            sheen_tint: self.tint(&sockets.sheen_tint)?,
             emission_color: self.tint(&sockets.emission_color)?,
             emission_strength: self.number(&sockets.emission_strength)?,
         };
         // What a light sample brings is not the mean then, but looked up.
-        let dimmed = leaf.is_coated() || !leaf.alpha.is(1.0);
+        let dimmed = leaf.is_covered() || !leaf.alpha.is(1.0);
         let shines = !leaf.emission_strength.is(0.0);
         self.need_if(Features::VIEW_DEPENDENT, shines && dimmed);
         Ok(Leaf::Principled4(Box::new(leaf)))

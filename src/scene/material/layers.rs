@@ -162,6 +162,7 @@ impl Layers {
                 finish: interface.relief.at::<F>(point),
                 absorption: to_model_color(absorption),
                 thickness,
+                ..Interface::new(1.0, Finish::Smooth)
             }
         });
         let interfaces: smallvec::SmallVec<[_; 4]> = interfaces.collect();

@@ -3,13 +3,16 @@
 
 mod factor;
 mod layers;
+mod openpbr;
 mod principled;
 mod rough;
 mod value;
+mod walked;
 
 pub use factor::Factor;
 pub use layers::{BaseLayer, InterfaceLayer, LayeredMaterial, Layers, Relief, Slab};
-pub use principled::{Principled3, Principled4, Setup};
+pub use openpbr::OpenPbr;
+pub use principled::{Layering, Principled3, Principled4, Setup};
 pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
 pub use value::{Number, Point, Tint};
 
@@ -18,7 +21,7 @@ use glam::Vec3;
 
 use super::{Surface, View};
 use crate::bsdf::{
-    Bsdf, Closure, Diffuser, Frame, Lambert, MAX_CLOSURES, OrenNayar, WeightedClosure,
+    Bsdf, Closure, Diffuser, Frame, Lambert, MAX_CLOSURES, OrenNayar, Sheen, WeightedClosure,
     seen_by_closures,
 };
 use crate::color::Rgb;
@@ -37,6 +40,8 @@ pub enum Leaf {
     Translucent(Tint),
     /// Ashikhmin's velvet: colour and σ.
     Velvet(Tint, Number),
+    /// Fibres: colour and roughness.
+    Sheen(Tint, Number),
     /// Straight through.
     Transparent(Tint),
     /// A microsurface.
@@ -49,6 +54,8 @@ pub enum Leaf {
     Principled3(Box<Principled3>),
     /// The node of Blender 4 and 5.
     Principled4(Box<Principled4>),
+    /// OpenPBR's surface.
+    OpenPbr(Box<OpenPbr>),
 }
 
 /// A leaf with the product of mix factors above it.
@@ -141,6 +148,10 @@ impl Material {
                     node.add(&mut bsdf, &layered(), surface, share);
                     continue;
                 }
+                Leaf::OpenPbr(node) if has::<F>(Features::PRINCIPLED) => {
+                    node.add(&mut bsdf, &point, surface, share);
+                    continue;
+                }
                 leaf if has::<F>(Features::DIFFUSERS) => {
                     match leaf.diffuser::<F>(&point, isotropic().to_local(seen())) {
                         Some(lobe) => (Closure::Diffuser(lobe), isotropic()),
@@ -180,6 +191,7 @@ impl Material {
                 }
                 Leaf::Principled3(node) => node.emission::<ALL>(point) * share(),
                 Leaf::Principled4(node) => node.emission::<ALL>(point) * share(),
+                Leaf::OpenPbr(node) => node.emission::<ALL>(point) * share(),
                 _ => continue,
             };
         }
@@ -224,6 +236,7 @@ impl Material {
             Leaf::Layered(layers) => layers.is_open(),
             Leaf::Principled3(node) => !node.transmission.is(0.0),
             Leaf::Principled4(node) => !node.transmission_weight.is(0.0),
+            Leaf::OpenPbr(node) => !node.transmission_weight.is(0.0),
             Leaf::Translucent(_) => true,
             _ => false,
         })
@@ -237,6 +250,7 @@ impl Material {
             Leaf::Layered(layers) => layers.is_radial(),
             Leaf::Principled3(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
             Leaf::Principled4(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
+            Leaf::OpenPbr(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
             _ => false,
         })
     }
@@ -249,12 +263,14 @@ impl Material {
             | Leaf::OrenNayar(tint, ..)
             | Leaf::Translucent(tint)
             | Leaf::Velvet(tint, _)
+            | Leaf::Sheen(tint, _)
             | Leaf::Transparent(tint) => tint.at::<ALL>(point),
             Leaf::Emission(..) => Rgb::ZERO,
             Leaf::Rough(rough) => rough.albedo::<ALL>(point),
             Leaf::Layered(layers) => layers.albedo::<ALL>(point),
             Leaf::Principled3(node) => node.base_color.at::<ALL>(point),
             Leaf::Principled4(node) => node.base_color.at::<ALL>(point),
+            Leaf::OpenPbr(node) => node.base_color.at::<ALL>(point),
         };
         self.leaves
             .iter()
@@ -270,6 +286,7 @@ impl Leaf {
         match self {
             Self::Principled3(node) => node.most_closures(),
             Self::Principled4(node) => node.most_closures(),
+            Self::OpenPbr(node) => node.most_closures(),
             _ => 1,
         }
     }
@@ -280,6 +297,7 @@ impl Leaf {
             Self::Emission(tint, strength) => (*tint, *strength),
             Self::Principled3(node) => (node.emission, node.emission_strength),
             Self::Principled4(node) => (node.emission_color, node.emission_strength),
+            Self::OpenPbr(node) => (node.emission_color, node.emission_strength()),
             _ => return None,
         };
         (!strength.is(0.0) && tint != Tint::Constant(Rgb::ZERO)).then_some((tint, strength))
@@ -300,6 +318,11 @@ impl Leaf {
                 color: tint.at::<F>(point),
                 steepness: sigma.at::<F>(point).max(LEAST_SIGMA).powi(-2),
             },
+            Self::Sheen(tint, roughness) => Diffuser::Sheen(Sheen::new(
+                tint.at::<F>(point),
+                roughness.share::<F>(point),
+                wo.z,
+            )),
             _ => return None,
         })
     }

@@ -1,20 +1,25 @@
 //! Blender's Principled BSDF: the closures that its layers come to at a point.
 //!
-//! Lower layers are darkened as Cycles does it, by one minus the albedo of the
-//! layer above towards the viewer. That keeps energy about right and is not how
-//! light moves: the base does not see the layer from inside.
+//! With `layering: cycles` lower layers are darkened as Cycles does it, by one minus
+//! the albedo of the layer above towards the viewer. That keeps energy about right and
+//! is not how light moves: the base does not see the layer from inside. With
+//! `layering: walks` light walks among the layers.
 
 use glam::Vec3;
 
 use super::super::Surface;
 use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, to_model_color};
 use super::value::{Number, Point, Tint};
+use super::walked::{self, FixedStacks, Walked};
 use crate::bsdf::{
     Albedos, Bsdf, Clearcoat, Closure, Diffuser, Distribution, Frame, Interface, Lambert, Listed,
-    Method, Mirror, OrenNayar, Rises, RoughClosure, WeightedClosure,
+    Method, Mirror, OrenNayar, Rises, RoughClosure, Sheen, WeightedClosure,
 };
 use crate::color::{Rgb, luminance};
-use smithwalk_model::{Conductor, ConductorFresnel, Glass, Refraction, fresnel};
+use smithwalk_model::layered::Interface as LayerInterface;
+use smithwalk_model::{
+    Conductor, ConductorFresnel, Diffuse, Estimator, Glass, Refraction, fresnel,
+};
 
 /// What is not a socket of the node.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +33,25 @@ pub struct Setup {
     pub glass: Option<Method>,
     /// The albedo of layers.
     pub rises: &'static Rises,
+    /// How layers darken each other.
+    pub layering: Layering,
+}
+
+/// How layers darken each other.
+#[derive(Clone, Copy, Debug)]
+pub enum Layering {
+    /// By their albedo towards the viewer.
+    Cycles,
+    /// By walks; with stacks made once if they are the same everywhere.
+    Walks(Option<&'static FixedStacks>),
+}
+
+impl Layering {
+    /// By walks, for a node without (`fixed`) or with textures.
+    pub fn walks(fixed: bool) -> Self {
+        // One for each material that is compiled: hundreds of bytes.
+        Self::Walks(fixed.then(|| &*Box::leak(Box::default())))
+    }
 }
 
 /// The node of Blender 2.8 to 3.6; sockets as in
@@ -78,6 +102,9 @@ pub struct Principled4 {
     pub coat_roughness: Number,
     pub coat_ior: Number,
     pub coat_tint: Tint,
+    pub sheen_weight: Number,
+    pub sheen_roughness: Number,
+    pub sheen_tint: Tint,
     pub emission_color: Tint,
     pub emission_strength: Number,
 }
@@ -108,23 +135,38 @@ impl<const F: u32> Stack<'_, '_, F> {
     fn push_plain(&mut self, closure: Closure, weight: Rgb, albedo: Rgb) {
         self.push(closure, Frame::about(self.surface.normal), weight, albedo);
     }
+}
 
-    /// What is let straight through, by the true surface.
-    fn push_transparent(&mut self, share: f32) {
-        let frame = Frame::about(self.surface.geometric_normal);
-        let closure = Closure::Transparent(Rgb::ONE);
-        self.push(closure, frame, Rgb::splat(share), Rgb::ONE);
-    }
+/// What is let straight through, by the true surface.
+pub(super) fn push_transparent<const F: u32>(bsdf: &mut Bsdf<F>, surface: &Surface, share: f32) {
+    let frame = Frame::about(surface.geometric_normal);
+    let closure = Closure::Transparent(Rgb::ONE);
+    Stack { bsdf, surface }.push(closure, frame, Rgb::splat(share), Rgb::ONE);
+}
+
+/// A closure of about this albedo without a tangent.
+pub(super) fn push_plain<const F: u32>(
+    bsdf: &mut Bsdf<F>,
+    surface: &Surface,
+    closure: Closure,
+    share: f32,
+    albedo: f32,
+) {
+    Stack { bsdf, surface }.push_plain(closure, Rgb::splat(share), Rgb::splat(albedo));
 }
 
 /// The least that a chance is taken for.
-const LEAST_CHANCE: f32 = 1e-3;
+pub(super) const LEAST_CHANCE: f32 = 1e-3;
 
 /// Shares up to this are none, as in Cycles.
-const NONE: f32 = 1e-5;
+pub(super) const NONE: f32 = 1e-5;
 
 /// A mirror or rough metal.
-fn reflecting(alphas: [f32; 2], fresnel: ConductorFresnel<f32>, method: Method) -> Closure {
+pub(super) fn reflecting(
+    alphas: [f32; 2],
+    fresnel: ConductorFresnel<f32>,
+    method: Method,
+) -> Closure {
     if alphas == [0.0; 2] {
         return Closure::Mirror(Mirror { fresnel });
     }
@@ -134,6 +176,39 @@ fn reflecting(alphas: [f32; 2], fresnel: ConductorFresnel<f32>, method: Method) 
 fn rough(alphas: [f32; 2], facets: impl Listed, method: Method) -> Closure {
     let alphas = alphas.map(|alpha| alpha.max(MIN_ALPHA));
     Closure::Rough(RoughClosure::new(Distribution::Ggx, alphas, facets, method))
+}
+
+/// Glass, rough or smooth, seen from the side of `eta`.
+pub(super) fn transmitting(
+    alphas: [f32; 2],
+    glass: Glass<f32>,
+    cos: f32,
+    method: Method,
+) -> Closure {
+    if alphas == [0.0; 2] {
+        smooth_glass(glass, cos)
+    } else {
+        rough(alphas, glass, method)
+    }
+}
+
+/// A diffuse base by itself; facets of slope roughness `alpha`.
+pub(super) fn diffuse_facets(albedo: Rgb, alpha: f32) -> Closure {
+    let albedo = albedo.min(Rgb::ONE);
+    if alpha <= NONE {
+        return Closure::Lambert(Lambert { albedo });
+    }
+    let facets = Diffuse {
+        albedo: to_model_color(albedo),
+    };
+    let method = Method::Multiple(Estimator::TwoWalk);
+    let alphas = [alpha; 2];
+    Closure::Rough(RoughClosure::new(
+        Distribution::Beckmann,
+        alphas,
+        facets,
+        method,
+    ))
 }
 
 /// α along the tangent and across, by the node's rule.
@@ -180,7 +255,19 @@ impl Principled4 {
         let method = self.setup.reflecting;
         let alpha = self.alpha.share::<F>(point);
         if alpha < 1.0 {
-            stack.push_transparent(share * (1.0 - alpha));
+            push_transparent(stack.bsdf, surface, share * (1.0 - alpha));
+        }
+        let (fibres, left) = self.sheen::<F>(point);
+        if let Some(closure) = fibres {
+            let albedo = Rgb::splat(1.0 - left);
+            stack.push_plain(closure, Rgb::splat(share * alpha), albedo);
+        }
+        let share = share * left;
+        if let Layering::Walks(fixed) = self.setup.layering {
+            let frame = self.frame::<F>(point, surface);
+            let (walked, plain) = self.walked::<F>(point, share * alpha, fixed);
+            walked.add(bsdf, surface, frame, plain);
+            return;
         }
         let mut weight = self.coat::<F>(point, share, |closure, weight, albedo| {
             stack.push_plain(closure, weight, albedo);
@@ -190,10 +277,7 @@ impl Principled4 {
         let clamped = base.min(Rgb::ONE);
         let roughness = self.roughness.share::<F>(point);
         let alphas = stretched(roughness, self.anisotropic.share::<F>(point));
-        let frame = self
-            .setup
-            .tangent
-            .frame::<F>(self.anisotropic_rotation, point, surface);
+        let frame = self.frame::<F>(point, surface);
         let tint = self.specular_tint.at::<F>(point).max(Rgb::ZERO);
 
         let metallic = self.metallic.share::<F>(point);
@@ -221,11 +305,8 @@ impl Principled4 {
                 reflection: to_model_color(reflection),
                 transmission: to_model_color(clamped.map(f32::sqrt)),
             };
-            let closure = if alpha > 0.0 {
-                rough([alpha; 2], glass, self.setup.glass.unwrap_or(method))
-            } else {
-                smooth_glass(glass, point.cos)
-            };
+            let method = self.setup.glass.unwrap_or(method);
+            let closure = transmitting([alpha; 2], glass, point.cos, method);
             stack.push_plain(closure, weight * transmission, Rgb::ONE);
             weight *= 1.0 - transmission;
         }
@@ -258,6 +339,81 @@ impl Principled4 {
             Closure::Lambert(Lambert { albedo: base })
         };
         stack.push_plain(closure, weight, base);
+    }
+
+    /// The sheen, and the share of light that it leaves to what lies below.
+    fn sheen<const F: u32>(&self, point: &Point<'_>) -> (Option<Closure>, f32) {
+        let weight = self.sheen_weight.at::<F>(point).max(0.0);
+        if weight <= NONE {
+            return (None, 1.0);
+        }
+        let color = self.sheen_tint.at::<F>(point).max(Rgb::ZERO) * weight;
+        let (closure, left) = fibres(color, self.sheen_roughness.share::<F>(point), point.cos);
+        (Some(closure), left)
+    }
+
+    fn frame<const F: u32>(&self, point: &Point<'_>, surface: &Surface) -> Frame {
+        let rotation = self.anisotropic_rotation;
+        self.setup.tangent.frame::<F>(rotation, point, surface)
+    }
+
+    /// The node's layers as they are, of this weight, and the diffuse base alone.
+    fn walked<const F: u32>(
+        &self,
+        point: &Point<'_>,
+        weight: f32,
+        fixed: Option<&'static FixedStacks>,
+    ) -> (Walked, Closure) {
+        let base = self.base_color.at::<F>(point).clamp(Rgb::ZERO, Rgb::ONE);
+        let tint = self.specular_tint.at::<F>(point).max(Rgb::ZERO);
+        let roughness = self.roughness.share::<F>(point);
+        let alphas = stretched(roughness, self.anisotropic.share::<F>(point));
+        let metallic = self.metallic.share::<F>(point);
+        let transmission = self.transmission_weight.share::<F>(point);
+        let ior = self.ior.at::<F>(point).max(NONE);
+        let (_, leveled) = leveled(ior, self.specular_ior_level.at::<F>(point).max(0.0));
+
+        let coat_roughness = self.coat_roughness.share::<F>(point);
+        let coat = walked::coat(
+            self.coat_ior.at::<F>(point).max(1.0),
+            [coat_roughness * coat_roughness; 2],
+            self.coat_tint.at::<F>(point),
+        );
+        let fresnel = edge_tinted(base, tint.min(Rgb::ONE));
+        let through = LayerInterface {
+            transmission: to_model_color(base.map(f32::sqrt)),
+            ..walked::interface(ior, 1.0, [roughness * roughness; 2], tint)
+        };
+        let glass = Glass {
+            eta: eta(ior, point.front),
+            reflection: through.reflection,
+            transmission: through.transmission,
+        };
+        let alpha = roughness * roughness;
+        let method = self.setup.glass.unwrap_or(self.setup.reflecting);
+        let dull = self.diffuse_roughness.share::<F>(point);
+        let plastic = (1.0 - metallic) * (1.0 - transmission);
+        let walked = Walked {
+            weight,
+            coat: (self.coat_weight.share::<F>(point), coat),
+            metal: (
+                metallic,
+                reflecting(alphas, fresnel, self.setup.reflecting),
+                walked::metal(alphas, fresnel),
+            ),
+            glass: (
+                (1.0 - metallic) * transmission,
+                transmitting([alpha; 2], glass, point.cos, method),
+                through,
+            ),
+            plastic: (
+                plastic,
+                [walked::interface(leveled, 1.0, alphas, tint); 2],
+                walked::diffuse(base, dull),
+            ),
+            fixed,
+        };
+        (walked, diffuse_facets(base, dull))
     }
 
     /// The albedo towards the viewer of a layer of such an interface, as Cycles
@@ -320,7 +476,8 @@ impl Principled4 {
         if strength == 0.0 {
             return Rgb::ZERO;
         }
-        let below = self.coat::<F>(point, 1.0, |_, _, _| {});
+        let (_, left) = self.sheen::<F>(point);
+        let below = self.coat::<F>(point, left, |_, _, _| {});
         self.emission_color.at::<F>(point) * strength * below
     }
 
@@ -331,14 +488,27 @@ impl Principled4 {
             self.coat_weight.is(0.0),
             self.metallic.is(0.0),
             self.transmission_weight.is(0.0),
+            self.sheen_weight.is(0.0),
         ];
-        6 - absent.into_iter().filter(|&absent| absent).count()
+        if let Layering::Walks(_) = self.setup.layering {
+            let [opaque, bare, no_metal, no_glass, no_sheen] = absent.map(usize::from);
+            return (1 - opaque) + (1 - no_sheen) + (2 - bare) * (3 - no_metal - no_glass);
+        }
+        7 - absent.into_iter().filter(|&absent| absent).count()
     }
 
     /// Whether its emission differs by who looks.
-    pub(in super::super) fn is_coated(&self) -> bool {
-        !self.coat_weight.is(0.0)
+    pub(in super::super) fn is_covered(&self) -> bool {
+        !(self.coat_weight.is(0.0) && self.sheen_weight.is(0.0))
     }
+}
+
+/// Sheen seen at the cosine `cos`, and the share of light that it leaves to what lies
+/// below: as in Cycles, by its albedo towards the viewer.
+pub(super) fn fibres(color: Rgb, roughness: f32, cos: f32) -> (Closure, f32) {
+    let sheen = Sheen::new(color, roughness, cos.min(1.0));
+    let left = 1.0 - (color.max_element() * sheen.albedo).clamp(0.0, 1.0);
+    (Closure::Diffuser(Diffuser::Sheen(sheen)), left)
 }
 
 /// F₀ and η with the node's level: ½ leaves them as they are.
@@ -374,7 +544,7 @@ impl Principled3 {
         let mut stack = Stack { bsdf, surface };
         let alpha = self.alpha.share::<F>(point);
         if alpha < 1.0 {
-            stack.push_transparent(share * (1.0 - alpha));
+            push_transparent(stack.bsdf, surface, share * (1.0 - alpha));
         }
         let weight = Rgb::splat(share * alpha);
         let base = self.base_color.at::<F>(point).max(Rgb::ZERO);
@@ -384,18 +554,27 @@ impl Principled3 {
         let glass = transmission * (1.0 - metallic);
         let roughness = self.roughness.share::<F>(point);
 
+        if let Layering::Walks(fixed) = self.setup.layering {
+            let walked = self.walked::<F>(point, share * alpha, fixed);
+            let frame = self
+                .setup
+                .tangent
+                .frame::<F>(self.anisotropic_rotation, point, surface);
+            let albedo = self.albedo::<F>(point);
+            walked.add(bsdf, surface, frame, diffuse_facets(albedo, 0.0));
+            let mut stack = Stack { bsdf, surface };
+            self.add_sheen::<F>(&mut stack, point, weight * diffuse);
+            return;
+        }
+
         if diffuse > NONE {
-            self.add_base::<F>(&mut stack, point, weight * diffuse, base, roughness);
+            self.add_base::<F>(&mut stack, point, weight * diffuse, roughness);
         }
 
         let specular = self.specular.at::<F>(point).max(0.0);
         if glass < 1.0 - NONE && (specular > NONE || metallic > NONE) {
-            let root = (0.08 * specular).min(0.99).sqrt();
-            let eta = 2.0 / (1.0 - root) - 1.0;
-            let tinted = self.specular_tint.share::<F>(point);
-            // Not Rec. 709's weights: as the node has it.
-            let gray = base.dot(Rgb::new(0.3, 0.6, 0.1));
-            let hue = mix(Rgb::ONE, hue(base, gray), Rgb::splat(tinted));
+            let eta = index_of(specular);
+            let hue = self.specular_hue::<F>(point, base);
             let f0 = hue * (0.08 * specular * (1.0 - metallic)) + base * metallic;
             let f0 = f0.clamp(Rgb::ZERO, Rgb::ONE);
             let fresnel = ConductorFresnel::Dielectric {
@@ -443,6 +622,10 @@ impl Principled3 {
             // Split glass is two.
             self.transmission.is(0.0),
         ];
+        if let Layering::Walks(_) = self.setup.layering {
+            let [opaque, no_sheen, bare, no_glass, _] = absent.map(usize::from);
+            return (1 - opaque) + (1 - no_sheen) + (2 - bare) * (3 - no_glass);
+        }
         7 - absent.into_iter().filter(|&absent| absent).count()
     }
 
@@ -452,14 +635,96 @@ impl Principled3 {
         stack: &mut Stack<'_, '_, F>,
         point: &Point<'_>,
         weight: Rgb,
-        base: Rgb,
         roughness: f32,
     ) {
-        let inner = self.subsurface_color.at::<F>(point).max(Rgb::ZERO);
-        let albedo = mix(base, inner, Rgb::splat(self.subsurface.share::<F>(point)));
+        let albedo = self.albedo::<F>(point);
         let burley = Diffuser::Burley { albedo, roughness };
         stack.push_plain(Closure::Diffuser(burley), weight, albedo);
+        self.add_sheen::<F>(stack, point, weight);
+    }
 
+    /// The albedo of the diffuse base.
+    fn albedo<const F: u32>(&self, point: &Point<'_>) -> Rgb {
+        let base = self.base_color.at::<F>(point).max(Rgb::ZERO);
+        let inner = self.subsurface_color.at::<F>(point).max(Rgb::ZERO);
+        mix(base, inner, Rgb::splat(self.subsurface.share::<F>(point)))
+    }
+
+    /// The colour of reflection at normal incidence.
+    fn specular_hue<const F: u32>(&self, point: &Point<'_>, base: Rgb) -> Rgb {
+        let tinted = self.specular_tint.share::<F>(point);
+        // Not Rec. 709's weights: as the node has it.
+        let gray = base.dot(Rgb::new(0.3, 0.6, 0.1));
+        mix(Rgb::ONE, hue(base, gray), Rgb::splat(tinted))
+    }
+
+    /// The node's layers as they are, without the sheen.
+    fn walked<const F: u32>(
+        &self,
+        point: &Point<'_>,
+        weight: f32,
+        fixed: Option<&'static FixedStacks>,
+    ) -> Walked {
+        let base = self.base_color.at::<F>(point).clamp(Rgb::ZERO, Rgb::ONE);
+        let metallic = self.metallic.share::<F>(point);
+        let transmission = self.transmission.share::<F>(point);
+        let roughness = self.roughness.share::<F>(point);
+        let alpha = roughness * roughness;
+        let alphas = stretched(roughness, self.anisotropic.share::<F>(point));
+        let specular = index_of(self.specular.at::<F>(point).max(0.0));
+        let fresnel = ConductorFresnel::Dielectric {
+            eta: specular,
+            f0: to_model_color(base),
+            f90: to_model_color(Rgb::ONE),
+        };
+        let ior = self.ior.at::<F>(point).max(NONE);
+        let tinted = Rgb::splat(self.specular_tint.share::<F>(point));
+        let through = LayerInterface {
+            transmission: to_model_color(base),
+            ..walked::interface(ior, 1.0, [alpha; 2], mix(Rgb::ONE, base, tinted))
+        };
+        let glass = Glass {
+            eta: eta(ior, point.front),
+            reflection: through.reflection,
+            transmission: through.transmission,
+        };
+        let method = self.setup.glass.unwrap_or(self.setup.reflecting);
+        let coat_roughness = self.clearcoat_roughness.share::<F>(point);
+        let coat_alpha = coat_roughness * coat_roughness;
+        let hue = self.specular_hue::<F>(point, base);
+        Walked {
+            weight,
+            coat: (
+                0.25 * self.clearcoat.at::<F>(point).clamp(0.0, 4.0),
+                walked::coat(1.5, [coat_alpha; 2], Rgb::ONE),
+            ),
+            metal: (
+                metallic,
+                reflecting(alphas, fresnel, self.setup.reflecting),
+                walked::metal(alphas, fresnel),
+            ),
+            glass: (
+                (1.0 - metallic) * transmission,
+                transmitting([alpha; 2], glass, point.cos, method),
+                through,
+            ),
+            plastic: (
+                (1.0 - metallic) * (1.0 - transmission),
+                [walked::interface(specular, 1.0, alphas, hue); 2],
+                walked::diffuse(self.albedo::<F>(point), 0.0),
+            ),
+            fixed,
+        }
+    }
+
+    /// The sheen, which is added to what lies below.
+    fn add_sheen<const F: u32>(
+        &self,
+        stack: &mut Stack<'_, '_, F>,
+        point: &Point<'_>,
+        weight: Rgb,
+    ) {
+        let base = self.base_color.at::<F>(point).max(Rgb::ZERO);
         let sheen = self.sheen.at::<F>(point).max(0.0);
         if sheen > NONE {
             let tinted = Rgb::splat(self.sheen_tint.share::<F>(point));
@@ -529,6 +794,12 @@ impl Principled3 {
         let strength = self.emission_strength.at::<F>(point).max(0.0);
         self.emission.at::<F>(point) * strength * self.alpha.share::<F>(point)
     }
+}
+
+/// The index of refraction of a `specular` of the node.
+fn index_of(specular: f32) -> f32 {
+    let root = (0.08 * specular).min(0.99).sqrt();
+    2.0 / (1.0 - root) - 1.0
 }
 
 /// The colour at luminance 1; white for black.

@@ -1,7 +1,7 @@
 //! Stacks as they are described, and how they are made from that.
 
 use super::{Layered, LayeredError, Level, Medium, Quantity, Surface};
-use crate::{Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Ggx};
+use crate::{Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Facets, Ggx, Glass};
 use crate::{Microsurface, Real, Rgb};
 use smallvec::{SmallVec, smallvec};
 
@@ -27,6 +27,11 @@ pub struct Interface<F> {
     pub absorption: Rgb<F>,
     /// Thickness of the slab below, in the same unit of length.
     pub thickness: F,
+    /// The factor on its reflectance at normal incidence, white for none; see
+    /// [`Glass`].
+    pub reflection: Rgb<F>,
+    /// The factor on what it lets through, in either direction.
+    pub transmission: Rgb<F>,
 }
 
 impl<F: Real> Interface<F> {
@@ -37,6 +42,8 @@ impl<F: Real> Interface<F> {
             finish,
             absorption: Rgb::black(),
             thickness: F::one(),
+            reflection: Rgb::white(),
+            transmission: Rgb::white(),
         }
     }
 }
@@ -171,23 +178,42 @@ impl<F: Real> Interface<F> {
     fn level(&self, number: usize, above: F) -> Result<Level<F>, LayeredError> {
         let number = Some(number);
         let ior = check(number, Quantity::Ior, self.ior, self.ior > F::zero())?;
-        let facets = Dielectric {
+        let mut facets = Glass {
             eta: ior / above,
-            tint: Rgb::white(),
+            reflection: self.reflection,
+            transmission: self.transmission,
         };
         check(number, Quantity::Ior, facets.eta, facets.eta > F::zero())?;
-        let finish = self.finish.settled(number)?;
-        let surface = if crate::Facets::invisible(&facets).is_some() {
-            Surface::Interface(Dielectric {
-                eta: F::one(),
-                ..facets
-            })
-        } else {
-            match finish {
-                Finish::Smooth => Surface::Interface(facets),
-                Finish::Ggx(ndf) => Surface::GgxDielectric(Microsurface { ndf, facets }),
-                Finish::Beckmann(ndf) => Surface::BeckmannDielectric(Microsurface { ndf, facets }),
+        let (zero, one) = (F::zero(), F::one());
+        let f0 = crate::fresnel::normal_reflectance(facets.eta);
+        check_rgb(number, Quantity::Reflection, self.reflection, |c| {
+            c >= zero && f0 * c <= one
+        })?;
+        check_rgb(number, Quantity::Transmission, self.transmission, |c| {
+            c >= zero && c <= one
+        })?;
+        let mut finish = self.finish.settled(number)?;
+        if facets.invisible().is_some() {
+            facets.eta = one;
+            facets.reflection = Rgb::white();
+            finish = Finish::Smooth;
+        }
+        let colored = facets.reflection != Rgb::white() || facets.transmission != Rgb::white();
+        let white = Dielectric {
+            eta: facets.eta,
+            tint: Rgb::white(),
+        };
+        let surface = match (finish, colored) {
+            (Finish::Smooth, false) => Surface::Interface(white),
+            (Finish::Smooth, true) => Surface::Colored(facets),
+            (Finish::Ggx(ndf), false) => {
+                Surface::GgxDielectric(Microsurface { ndf, facets: white })
             }
+            (Finish::Ggx(ndf), true) => Surface::GgxGlass(Microsurface { ndf, facets }),
+            (Finish::Beckmann(ndf), false) => {
+                Surface::BeckmannDielectric(Microsurface { ndf, facets: white })
+            }
+            (Finish::Beckmann(ndf), true) => Surface::BeckmannGlass(Microsurface { ndf, facets }),
         };
         Ok(Level {
             surfaces: smallvec![(F::one(), surface)],

@@ -13,6 +13,11 @@ pub enum Quantity {
     Thickness,
     /// The absorption of a slab, per unit of length: not negative.
     Absorption,
+    /// The factor on an interface's reflectance at normal incidence: not
+    /// negative, and no more than makes it 1.
+    Reflection,
+    /// The factor on what an interface lets through: from 0 to 1.
+    Transmission,
     /// An albedo or a reflectance: from 0 to 1.
     Reflectance,
     /// A component of a complex index of refraction: not negative, and not 0
@@ -30,6 +35,11 @@ impl Quantity {
             Self::Alpha => ["alpha", "0 or more, and finite"],
             Self::Thickness => ["thickness", "0 or more, and finite"],
             Self::Absorption => ["absorption", "0 or more, and finite"],
+            Self::Reflection => [
+                "colour of reflection",
+                "0 or more, and such that no more than all is reflected",
+            ],
+            Self::Transmission => ["colour of transmission", "between 0 and 1"],
             Self::Reflectance => ["reflectance", "between 0 and 1"],
             Self::ComplexIndex => ["complex index", "0 or more, finite, and not 0 + 0i"],
             Self::Share => ["share of the mix", "between 0 and 1"],

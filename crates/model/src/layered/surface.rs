@@ -2,7 +2,7 @@
 
 use crate::fresnel;
 use crate::walk::Ray;
-use crate::{Beckmann, Bounce, Conductor, Dielectric, Diffuse, Draw, Exit, Facets, Ggx};
+use crate::{Beckmann, Bounce, Conductor, Dielectric, Diffuse, Draw, Exit, Facets, Ggx, Glass};
 use crate::{Microsurface, Real, Rgb, Side, Vector3};
 
 /// An interface, or a base.
@@ -10,6 +10,8 @@ use crate::{Microsurface, Real, Rgb, Side, Vector3};
 pub(super) enum Surface<F: Real> {
     /// A smooth interface.
     Interface(Dielectric<F>),
+    /// A smooth interface with colours.
+    Colored(Glass<F>),
     /// Smooth metal.
     Mirror(Conductor<F>),
     /// Smooth diffuse facets.
@@ -18,6 +20,10 @@ pub(super) enum Surface<F: Real> {
     GgxDielectric(Microsurface<Ggx<F>, Dielectric<F>>),
     /// A rough interface, Beckmann.
     BeckmannDielectric(Microsurface<Beckmann<F>, Dielectric<F>>),
+    /// A rough interface with colours, GGX.
+    GgxGlass(Microsurface<Ggx<F>, Glass<F>>),
+    /// A rough interface with colours, Beckmann.
+    BeckmannGlass(Microsurface<Beckmann<F>, Glass<F>>),
     /// Rough metal, GGX.
     GgxConductor(Microsurface<Ggx<F>, Conductor<F>>),
     /// Rough metal, Beckmann.
@@ -34,6 +40,8 @@ macro_rules! each_rough {
         match $surface {
             Surface::GgxDielectric($rough) => $body,
             Surface::BeckmannDielectric($rough) => $body,
+            Surface::GgxGlass($rough) => $body,
+            Surface::BeckmannGlass($rough) => $body,
             Surface::GgxConductor($rough) => $body,
             Surface::BeckmannConductor($rough) => $body,
             Surface::GgxDiffuse($rough) => $body,
@@ -92,26 +100,27 @@ pub(super) fn bounce_smooth<F: Real, I: Facets<Scalar = F>>(
     }
 }
 
-impl<F: Real> Dielectric<F> {
-    /// The share of light from `w` that a smooth interface lets through, and
-    /// its direction; both directions in the frame of `side`. `None` under
-    /// total reflection.
-    pub(super) fn let_through(self, side: Side, w: Vector3<F>) -> Option<(F, Vector3<F>)> {
-        let eta = match side {
-            Side::Above => self.eta,
-            Side::Below => self.eta.recip(),
-        };
-        let (reflectance, cos_t) = fresnel::dielectric(w.z, eta);
-        let direction = Vector3::new(-w.x / eta, -w.y / eta, -cos_t).normalized();
-        (reflectance < F::one() && cos_t > F::zero()).then_some((F::one() - reflectance, direction))
-    }
+/// The share of light from `w` that a smooth interface without colours lets
+/// through, and its direction; both directions in the frame of `side`. `eta` is
+/// n(below) / n(above). `None` under total reflection.
+pub(super) fn let_through<F: Real>(eta: F, side: Side, w: Vector3<F>) -> Option<(F, Vector3<F>)> {
+    let eta = match side {
+        Side::Above => eta,
+        Side::Below => eta.recip(),
+    };
+    let (reflectance, cos_t) = fresnel::dielectric(w.z, eta);
+    let direction = Vector3::new(-w.x / eta, -w.y / eta, -cos_t).normalized();
+    (reflectance < F::one() && cos_t > F::zero()).then_some((F::one() - reflectance, direction))
 }
 
 impl<F: Real> Surface<F> {
     /// Whether it sends light into single directions only.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Interface(_) | Self::Mirror(_))
+        matches!(
+            self,
+            Self::Interface(_) | Self::Colored(_) | Self::Mirror(_)
+        )
     }
 
     /// Where light from `w` goes, above or below the surface; all orders.
@@ -119,10 +128,13 @@ impl<F: Real> Surface<F> {
     pub fn scatter(&self, w: Vector3<F>, rng: &mut impl Draw<F>) -> Option<Exit<F>> {
         match self {
             Self::Interface(facets) => Some(smooth_exit(facets, w, rng)),
+            Self::Colored(facets) => Some(smooth_exit(facets, w, rng)),
             Self::Mirror(facets) => Some(smooth_exit(facets, w, rng)),
             Self::Lambert(facets) => Some(smooth_exit(facets, w, rng)),
             Self::GgxDielectric(rough) => from_either_side(rough, w, rng),
             Self::BeckmannDielectric(rough) => from_either_side(rough, w, rng),
+            Self::GgxGlass(rough) => from_either_side(rough, w, rng),
+            Self::BeckmannGlass(rough) => from_either_side(rough, w, rng),
             Self::GgxConductor(rough) => rough.sample(w, rng),
             Self::BeckmannConductor(rough) => rough.sample(w, rng),
             Self::GgxDiffuse(rough) => rough.sample(w, rng),
@@ -133,11 +145,15 @@ impl<F: Real> Surface<F> {
     /// Slope roughness along x and y.
     pub fn alphas(&self) -> [F; 2] {
         match self {
-            Self::Interface(_) | Self::Mirror(_) | Self::Lambert(_) => [F::zero(); 2],
+            Self::Interface(_) | Self::Colored(_) | Self::Mirror(_) | Self::Lambert(_) => {
+                [F::zero(); 2]
+            }
             Self::GgxDielectric(Microsurface { ndf, .. })
+            | Self::GgxGlass(Microsurface { ndf, .. })
             | Self::GgxConductor(Microsurface { ndf, .. })
             | Self::GgxDiffuse(Microsurface { ndf, .. }) => [ndf.alpha_x, ndf.alpha_y],
             Self::BeckmannDielectric(Microsurface { ndf, .. })
+            | Self::BeckmannGlass(Microsurface { ndf, .. })
             | Self::BeckmannConductor(Microsurface { ndf, .. })
             | Self::BeckmannDiffuse(Microsurface { ndf, .. }) => [ndf.alpha_x, ndf.alpha_y],
         }
@@ -149,6 +165,9 @@ impl<F: Real> Surface<F> {
             Self::Interface(facets)
             | Self::GgxDielectric(Microsurface { facets, .. })
             | Self::BeckmannDielectric(Microsurface { facets, .. }) => Some(facets.eta),
+            Self::Colored(facets)
+            | Self::GgxGlass(Microsurface { facets, .. })
+            | Self::BeckmannGlass(Microsurface { facets, .. }) => Some(facets.eta),
             _ => None,
         }
     }

@@ -25,7 +25,7 @@
 //! Colours and absorption are the same in both directions, and stay out of the
 //! weights.
 
-use super::surface::{Surface, bounce_smooth, each_rough, localized, side_of};
+use super::surface::{Surface, bounce_smooth, each_rough, let_through, localized, side_of};
 use super::{Layered, Level, Next};
 use crate::walk::{Ray, Roulette, depth_from_other_side};
 use crate::{At, Draw, Facets, Microsurface, Ndf, Phase, Real, Rgb, Vector3};
@@ -186,10 +186,19 @@ impl<F: Real> Surface<F> {
             Surface::Interface(facets) if trail.arrivals.len() == 1 => {
                 // What it reflects here leaves, and adds nothing: all goes through.
                 let side = side_of(arrival.w);
-                let (share, direction) = facets.let_through(side, localized(side, arrival.w))?;
+                let (share, direction) = let_through(facets.eta, side, localized(side, arrival.w))?;
                 Some(smooth(localized(side, direction), Rgb::splat(share)))
             }
+            Surface::Colored(facets) if trail.arrivals.len() == 1 => {
+                let side = side_of(arrival.w);
+                let (share, direction) = let_through(facets.eta, side, localized(side, arrival.w))?;
+                Some(smooth(localized(side, direction), facets.transmitted() * share))
+            }
             Surface::Interface(facets) => {
+                let bounce = bounce_smooth(facets, arrival.w, rng);
+                Some(smooth(bounce.direction, bounce.weight))
+            }
+            Surface::Colored(facets) => {
                 let bounce = bounce_smooth(facets, arrival.w, rng);
                 Some(smooth(bounce.direction, bounce.weight))
             }
@@ -234,7 +243,7 @@ impl<F: Real> Surface<F> {
                 weight: facets.albedo,
                 resistance: squares[0] * F::PI(),
             }),
-            Surface::Interface(_) | Surface::Mirror(_) => None,
+            Surface::Interface(_) | Surface::Colored(_) | Surface::Mirror(_) => None,
         )
     }
 }

@@ -143,6 +143,23 @@ fn zoo() -> Vec<(&'static str, Layered<f64>)> {
             "two rough ones on Lambert",
             stack(&[(1.8, 0.2), (1.3, 0.5)], lambert(0.9)),
         ),
+        (
+            "tinted, α 0.2 under smooth on Lambert",
+            made(
+                &[
+                    Interface {
+                        reflection: Rgb([0.2, 1.0, 3.0]),
+                        transmission: Rgb([0.9, 0.6, 1.0]),
+                        ..Interface::new(1.5, Finish::Smooth)
+                    },
+                    Interface {
+                        reflection: Rgb([1.0, 0.3, 2.0]),
+                        ..Interface::new(1.8, finish(0.2))
+                    },
+                ],
+                lambert(0.8),
+            ),
+        ),
         ("a pane", stack(&[(1.5, 0.3), (1.0, 0.4)], Base::Open)),
         ("into glass", stack(&[(1.3, 0.0), (1.6, 0.4)], Base::Open)),
         (
