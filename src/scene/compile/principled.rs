@@ -101,12 +101,12 @@ impl Compiler<'_> {
         let ior = self.number(&sockets.ior)?;
         let transmission = self.number(&sockets.transmission)?;
         let subsurface = self.number(&sockets.subsurface)?;
-        if node.layering == desc::Layering::Walks {
-            if sockets.transmission_roughness != desc::Scalar::Value(0.0) {
-                self.note(
-                    "by walks an interface has one roughness: transmission_roughness is left out",
-                );
-            }
+        if node.layering == desc::Layering::Walks
+            && sockets.transmission_roughness != desc::Scalar::Value(0.0)
+        {
+            self.note(
+                "by walks an interface has one roughness: transmission_roughness is left out",
+            );
         }
         if !subsurface.is(0.0) {
             self.note("subsurface scattering is a diffuse base of the same colour");
