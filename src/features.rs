@@ -62,6 +62,8 @@ features! {
     PRINCIPLED = 20, "principled", "the node's layers put together per hit";
     /// Stacks of interfaces.
     LAYERS = 21, "layers", "walks among interfaces in sampling and evaluation";
+    /// Objects that are filled with something that absorbs.
+    ABSORPTION = 22, "absorption", "the media that a path is in, and what they leave of it, per ray";
 }
 
 impl Features {

@@ -241,6 +241,38 @@ fn layers_that_contradict_themselves() {
 }
 
 #[test]
+fn insides_that_contradict_themselves() {
+    let filled = |keys: &str| format!("materials: {{m: {{filled: {{{keys}}}}}}}");
+    let cases = [
+        ("nothing inside", "surface: {dielectric: {}}"),
+        (
+            "absorption said twice",
+            "surface: {dielectric: {}}, absorption: 1, transmittance: 0.5",
+        ),
+        ("depth of nothing", "surface: {dielectric: {}}, depth: 1"),
+        (
+            "no depth",
+            "surface: {dielectric: {}}, transmittance: 0.5, depth: 0",
+        ),
+        (
+            "light out of nothing",
+            "surface: {dielectric: {}}, absorption: [1, -1, 0]",
+        ),
+        (
+            "filled twice",
+            "surface: {filled: {surface: {dielectric: {}}, absorption: 1}}, absorption: 1",
+        ),
+        (
+            "a part of a mix",
+            "surface: {mix: {a: {diffuse: {}}, b: {filled: {surface: {dielectric: {}}, absorption: 1}}}}, absorption: 1",
+        ),
+    ]
+    .map(|(what, keys)| (what, filled(keys)));
+    let cases: Vec<_> = cases.iter().map(|(what, text)| (*what, &**text)).collect();
+    insta::assert_snapshot!(scenes(&cases));
+}
+
+#[test]
 fn values_out_of_range() {
     insta::assert_snapshot!(scenes(&[
         (

@@ -1,6 +1,7 @@
 //! The renderer and the command from outside, in one program: linking Embree
 //! once takes less time than once for each file.
 
+mod absorption;
 mod bad_input;
 mod blender;
 mod camera;
@@ -11,6 +12,7 @@ mod cycles;
 mod description;
 mod description_files;
 mod diff;
+mod explicit_stack;
 mod extreme_scenes;
 mod extremes;
 mod film_files;

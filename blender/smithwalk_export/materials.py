@@ -214,11 +214,12 @@ class _Surface:
             if not output.inputs["Surface"].is_linked:
                 self.wrong("a volume without a surface is left out: transparent")
                 return {"transparent": {}}
-            self.warn("its volume is left out")
         if not output.inputs["Surface"].is_linked:
             self.note("has no surface: black, as in Cycles")
             return BLACK
         surface = self.closure(output.inputs["Surface"], ())
+        if output.inputs["Volume"].is_linked:
+            surface = self.filled(surface, output.inputs["Volume"])
         for node, what in self.graph.lost():
             if what == "input Normal (linked)":
                 what = "its normal input (bump or normal map)"
@@ -228,6 +229,23 @@ class _Surface:
         for what in self.writer.audit.leftovers(material):
             self.warn(f"{what}: left out")
         return surface
+
+    def filled(self, surface, socket):
+        """A surface around the volume that feeds a socket: absorption alone is carried."""
+        source = self.graph.follow(socket, ())
+        if not source.linked or source.node.mute:
+            return surface
+        node = source.node
+        if node.type != "VOLUME_ABSORPTION":
+            self.warn(f"its volume is left out ({node.bl_label})")
+            return surface
+        self.graph.view(node)
+        color, density = (self.value(node, name, source.groups) for name in ("Color", "Density"))
+        if not isinstance(color, tuple) or not isinstance(density, float):
+            self.warn("its volume is left out: absorption that differs from place to place")
+            return surface
+        absorption = tuple(max(1.0 - c, 0.0) * max(density, 0.0) for c in color[:3])
+        return {"filled": {"surface": surface, "absorption": _grey(absorption)}} if any(absorption) else surface
 
     def closure(self, socket, groups):
         """The material that feeds a shader socket."""

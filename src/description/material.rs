@@ -1,5 +1,6 @@
 //! Materials.
 
+use super::filled::Filled;
 use super::layered::Layered;
 use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
@@ -39,6 +40,8 @@ pub enum Material {
     Mix(Mix),
     /// Two materials, added.
     Sum(Sum),
+    /// A surface around something that absorbs.
+    Filled(Filled),
     /// Interfaces over a base.
     Layered(Layered),
     /// Blender's node.
@@ -529,14 +532,15 @@ impl Material {
                     }
                     Factor::Backfacing | Factor::CameraRay => {}
                 }
-                mix.a.check(check, at.key("a"));
-                mix.b.check(check, at.key("b"));
+                mix.a.check_part(check, at.key("a"));
+                mix.b.check_part(check, at.key("b"));
             }
             Self::Sum(sum) => {
                 let at = at.key("sum");
-                sum.a.check(check, at.key("a"));
-                sum.b.check(check, at.key("b"));
+                sum.a.check_part(check, at.key("a"));
+                sum.b.check_part(check, at.key("b"));
             }
+            Self::Filled(filled) => filled.check(check, &at.key("filled")),
             Self::Layered(layered) => layered.check(check, &at.key("layered")),
             Self::Principled(principled) => principled.check(check, &at.key("principled")),
             Self::OpenPbr(surface) => surface.check(check, &at.key("openpbr")),
@@ -547,6 +551,7 @@ impl Material {
     pub(crate) fn parts(&self) -> impl Iterator<Item = &MaterialRef> {
         let parts = match self {
             Self::Mix(Mix { a, b, .. }) | Self::Sum(Sum { a, b }) => [Some(a), Some(b)],
+            Self::Filled(filled) => [Some(&filled.surface), None],
             Self::Layered(layered) => [layered.base.as_ref(), None],
             _ => [None; 2],
         };
@@ -555,6 +560,17 @@ impl Material {
 }
 
 impl MaterialRef {
+    /// Checks a part of a material.
+    pub(super) fn check_part(&self, check: &mut Check<'_, '_>, at: At) {
+        if let Self::Inline(material) = self {
+            if let Material::Filled(_) = **material {
+                let message = "a part has no inside of its own: put `filled` around the whole";
+                check.report(at.clone(), message.to_owned());
+            }
+        }
+        self.check(check, at);
+    }
+
     pub(super) fn check(&self, check: &mut Check<'_, '_>, at: At) {
         match self {
             Self::Name(name) => check.reference("materials", "material", name, at),

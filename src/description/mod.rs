@@ -6,6 +6,7 @@
 mod animation;
 mod camera;
 mod document;
+mod filled;
 mod layered;
 mod light;
 mod material;
@@ -27,6 +28,7 @@ pub use animation::{Animation, Changes, Frame};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
 };
+pub use filled::{Filled, Interior};
 pub(crate) use layered::fits;
 pub use layered::{Interface, Layered, Slab};
 pub use light::{AreaShape, Light, LightKind};

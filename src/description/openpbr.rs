@@ -62,8 +62,11 @@ parameters! {
     specular_ior: Scalar = 1.5, Range::Positive;
     /// How much of the base is clear.
     transmission_weight: Scalar = 0.0, Range::UNIT;
-    /// The colour of what is let through, at each refraction.
+    /// The colour of what is let through, after `transmission_depth` or at each
+    /// refraction.
     transmission_color: Color = 1.0, Range::UNIT;
+    /// Metres after which `transmission_color` is left of what is let through; 0: at once.
+    transmission_depth: Scalar = 0.0, Range::NonNegative;
     /// How much of a coat there is.
     coat_weight: Scalar = 0.0, Range::UNIT;
     /// What the coat lets through at normal incidence, there and back.

@@ -142,7 +142,7 @@ impl Check<'_, '_> {
         self.sources.report(place, dotted(&path), message, nearest);
     }
 
-    fn number(&mut self, value: f32, range: Range, at: At) {
+    pub(super) fn number(&mut self, value: f32, range: Range, at: At) {
         if !range.contains(value) {
             self.report(at, format!("expected {}, found {value}", range.words()));
         }
@@ -158,7 +158,7 @@ impl Check<'_, '_> {
     }
 
     /// A colour whose channels are all in one range.
-    fn triple(&mut self, channels: [f32; 3], range: Range, at: At) {
+    pub(super) fn triple(&mut self, channels: [f32; 3], range: Range, at: At) {
         if let Some(value) = channels.into_iter().find(|&value| !range.contains(value)) {
             self.report(
                 at,

@@ -7,6 +7,7 @@ mod direct;
 mod emission;
 mod lanes;
 mod mean;
+mod media;
 mod result;
 mod state;
 mod tracer;
@@ -127,6 +128,14 @@ impl<const F: u32> PathTracer<'_, F> {
             };
             let surface = self.scene.surface::<F>(&path.ray, &hit);
             path.to_surface = hit.t;
+            if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
+                path.deposit(emitted, &mut found.radiance);
+                emitted = Rgb::ZERO;
+                path.throughput *= path.media.transmittance(hit.t);
+                if path.throughput == Rgb::ZERO {
+                    return None;
+                }
+            }
             if has::<F>(Features::HIDDEN_OBJECTS)
                 && camera
                 && path.vertex < MAX_STRAIGHT
@@ -151,7 +160,16 @@ impl<const F: u32> PathTracer<'_, F> {
             if path.throughput == Rgb::ZERO {
                 return None;
             }
+            self.cross(path, &surface);
             path.pass_through(&surface);
+        }
+    }
+
+    /// Keeps what the path is inside of when it goes through a surface.
+    #[inline(always)]
+    fn cross(&self, path: &mut Path, surface: &Surface) {
+        if has::<F>(Features::ABSORPTION) {
+            path.media.cross(self.scene, surface);
         }
     }
 
@@ -193,8 +211,12 @@ impl<const F: u32> PathTracer<'_, F> {
         path.throughput *= sample.weight;
         if has::<F>(Features::TRANSPARENCY) && sample.straight {
             // Goes on as if nothing had been there.
+            self.cross(path, surface);
             path.pass_through(surface);
             return path.vertex <= MAX_STRAIGHT;
+        }
+        if sample.wi.dot(surface.geometric_normal) < 0.0 {
+            self.cross(path, surface);
         }
         path.vertex += 1;
         path.bounce += 1;

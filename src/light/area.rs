@@ -221,9 +221,9 @@ impl AreaLight {
 
     /// The radiance along a ray and the density with which
     /// [`AreaLight::sample`] would have found it, sr⁻¹, without the
-    /// probability of choosing this light.
+    /// probability of choosing this light; and how far away it is.
     #[inline]
-    pub(super) fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32)> {
+    pub(super) fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32, f32)> {
         let cos = -ray.direction.dot(self.normal);
         if cos <= 0.0 {
             return None;
@@ -237,7 +237,8 @@ impl AreaLight {
         if !self.covers(at.dot(self.x), at.dot(self.y)) {
             return None;
         }
-        self.found(ray.origin, t, cos)
+        let (radiance, pdf) = self.found(ray.origin, t, cos)?;
+        Some((radiance, pdf, t))
     }
 
     /// The radiance at a cosine to the normal, from a point of the light at the

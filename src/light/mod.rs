@@ -136,10 +136,13 @@ impl Shape {
     }
 
     #[inline]
-    fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32)> {
+    fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32, f32)> {
         match self {
             Self::Point(light) => light.crossed(ray),
-            Self::Sun(light) if ray.t_far == f32::INFINITY => light.seen(ray.direction),
+            Self::Sun(light) if ray.t_far == f32::INFINITY => {
+                let (radiance, pdf) = light.seen(ray.direction)?;
+                Some((radiance, pdf, f32::INFINITY))
+            }
             Self::Sun(_) => None,
             Self::Area(light) => light.crossed(ray),
         }
@@ -348,7 +351,7 @@ impl Lights {
         ray: &Ray,
         normal: Option<Vec3>,
         camera: bool,
-        mut visit: impl FnMut(Rgb, f32),
+        mut visit: impl FnMut(Rgb, f32, f32),
     ) {
         let receiver = Receiver {
             position: ray.origin,
@@ -359,8 +362,9 @@ impl Lights {
             if camera && !light.visible_to_camera {
                 return;
             }
-            if let Some((radiance, pdf)) = light.shape.crossed(ray) {
-                visit(radiance, pdf * self.selection(index as usize, &receiver));
+            if let Some((radiance, pdf, distance)) = light.shape.crossed(ray) {
+                let pdf = pdf * self.selection(index as usize, &receiver);
+                visit(radiance, pdf, distance);
             }
         };
         match &self.sized_tree {

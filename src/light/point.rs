@@ -199,8 +199,8 @@ impl PointLight {
 
     /// The radiance along a ray and the density with which
     /// [`PointLight::sample`] would have found it, sr⁻¹, without the
-    /// probability of choosing this light.
-    pub(super) fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32)> {
+    /// probability of choosing this light; and how far away it is.
+    pub(super) fn crossed(&self, ray: &Ray) -> Option<(Rgb, f32, f32)> {
         let view = self.view(ray.origin)?;
         if !view.cone.contains(ray.direction) {
             return None;
@@ -210,6 +210,7 @@ impl PointLight {
             (
                 self.radiance() * self.beamed(ray.direction),
                 view.cone.pdf(),
+                t,
             )
         })
     }

@@ -36,6 +36,12 @@ pub enum MaterialError {
     /// A textured index of refraction where a table is made for each.
     #[error("the estimator `compensated` takes no texture for `ior`")]
     TexturedIndex,
+    /// Something inside of a part of a material.
+    #[error("a part of a mix has no inside of its own: put `filled` around the whole")]
+    FilledPart,
+    /// A texture where the inside of an object has one colour.
+    #[error("with `transmission_depth` neither it nor `transmission_color` takes a texture")]
+    TexturedInterior,
     /// Layers that no stack can be made of, and why.
     #[error("`layered`: {0}")]
     Stack(String),
@@ -121,6 +127,8 @@ impl<'a> Materials<'a> {
             leaves: Vec::new(),
             closures: 0,
             lookups: 0,
+            interior: None,
+            depth: 0,
         };
         let result = compiler.add(material, &Above::default());
         self.textures = std::mem::take(&mut compiler.textures);
@@ -148,6 +156,8 @@ pub fn compile_alone(
         leaves: Vec::new(),
         closures: 0,
         lookups: 0,
+        interior: None,
+        depth: 0,
     };
     compiler.add(material, &Above::default())?;
     Ok(compiler.finish().material)
@@ -196,6 +206,10 @@ struct Compiler<'a> {
     closures: usize,
     /// How often a texture has been asked for.
     lookups: usize,
+    /// What the inside absorbs, m⁻¹.
+    interior: Option<Rgb>,
+    /// How many mixes and sums what is being compiled is inside of.
+    depth: usize,
 }
 
 impl<'a> Compiler<'a> {
@@ -207,6 +221,7 @@ impl<'a> Compiler<'a> {
         Compiled {
             material: Material {
                 leaves: self.leaves,
+                interior: self.interior,
             },
             needs: self.needs,
         }
@@ -233,6 +248,10 @@ impl<'a> Compiler<'a> {
             desc::Material::Sum(sum) => {
                 self.add_part(&sum.a, above)?;
                 return self.add_part(&sum.b, above);
+            }
+            desc::Material::Filled(filled) => {
+                self.fill(Rgb::from(filled.interior.absorption()))?;
+                return self.add(self.part(&filled.surface)?, above);
             }
             desc::Material::Conductor(conductor) => {
                 let reflectance = self.metal(&conductor.reflectance)?;
@@ -298,7 +317,22 @@ impl<'a> Compiler<'a> {
     }
 
     fn add_part(&mut self, part: &desc::MaterialRef, above: &Above) -> Result<(), MaterialError> {
-        self.add(self.part(part)?, above)
+        self.depth += 1;
+        self.add(self.part(part)?, above)?;
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// Fills the inside with what absorbs this, m⁻¹.
+    fn fill(&mut self, absorption: Rgb) -> Result<(), MaterialError> {
+        if self.depth > 0 || self.interior.is_some() {
+            return Err(MaterialError::FilledPart);
+        }
+        if absorption.max_element() > 0.0 {
+            self.interior = Some(absorption);
+            self.need_if(Features::ABSORPTION, true);
+        }
+        Ok(())
     }
 
     fn part<'b>(&self, part: &'b desc::MaterialRef) -> Result<&'b desc::Material, MaterialError>

@@ -156,7 +156,7 @@ pub fn check_crossings(lights: &Lights, p: Vec3, n: usize, seed: u64, tolerance:
             ray.t_far = sample.distance * 1.01;
         }
         let mut met = false;
-        lights.crossed(&ray, None, false, |radiance, pdf| {
+        lights.crossed(&ray, None, false, |radiance, pdf, _| {
             met |= (radiance - sample.radiance).length() <= tolerance * sample.radiance.length()
                 && (pdf / sample.pdf - 1.0).abs() <= tolerance;
         });
@@ -178,7 +178,7 @@ pub fn total_density(lights: &Lights, p: Vec3, n: usize, seed: u64) -> Estimate 
     Estimate::of(n, || {
         let ray = Ray::new(p, direction(&mut rng));
         let mut sum = 0.0;
-        lights.crossed(&ray, None, false, |_, pdf| sum += f64::from(pdf));
+        lights.crossed(&ray, None, false, |_, pdf, _| sum += f64::from(pdf));
         sum * 4.0 * std::f64::consts::PI
     })
 }

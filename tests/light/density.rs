@@ -191,7 +191,7 @@ fn camera_rays_see_only_visible_lights() {
         let lights = Lights::new(vec![lamp], black(), Vec::new());
         let count = |ray: &Ray, camera| {
             let mut count = 0;
-            lights.crossed(ray, None, camera, |_, _| count += 1);
+            lights.crossed(ray, None, camera, |_, _, _| count += 1);
             count
         };
         let mut ray = Ray::new(Vec3::ZERO, Vec3::Z);

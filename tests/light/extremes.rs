@@ -92,7 +92,7 @@ fn samples_are_finite_wherever_they_are_taken_from() {
                     assert!(sample.distance > 0.0);
                 }
                 let ray = smithwalk::embree::Ray::new(p, direction(&mut rng));
-                lights.crossed(&ray, None, false, |radiance, pdf| {
+                lights.crossed(&ray, None, false, |radiance, pdf, _| {
                     assert!(radiance.is_finite() && pdf >= 0.0 && !pdf.is_nan());
                 });
             }

@@ -324,12 +324,12 @@ fn densities_of_a_mixture_agree() {
             ray.t_far = rng.random_range(2.0..6.0);
         }
         let mut found = Vec::new();
-        lights.crossed(&ray, None, false, |radiance, pdf| {
+        lights.crossed(&ray, None, false, |radiance, pdf, _| {
             found.push((radiance.x, pdf))
         });
         let mut expected = Vec::new();
         for light in &apart {
-            light.crossed(&ray, None, false, |radiance, pdf| {
+            light.crossed(&ray, None, false, |radiance, pdf, _| {
                 expected.push((radiance.x, pdf))
             });
         }
@@ -352,7 +352,7 @@ fn densities_of_a_mixture_agree() {
         let mut ray = Ray::new(p, sample.direction);
         ray.t_far = sample.distance * 1.01;
         let mut same = false;
-        lights.crossed(&ray, None, false, |_, pdf| {
+        lights.crossed(&ray, None, false, |_, pdf, _| {
             same |= (pdf / sample.pdf - 1.0).abs() < 1e-3
         });
         again += i32::from(same) - i32::from(!same) * 1000;

@@ -37,7 +37,7 @@ fn lights(kind: LightKind, units: LightUnits) -> Lights {
 /// The radiance that a ray straight up meets.
 fn radiance(lights: &Lights) -> f64 {
     let mut radiance = f64::NAN;
-    lights.crossed(&Ray::new(Vec3::ZERO, Vec3::Z), None, false, |met, _| {
+    lights.crossed(&Ray::new(Vec3::ZERO, Vec3::Z), None, false, |met, _, _| {
         radiance = f64::from(met.x);
     });
     radiance

@@ -10,7 +10,7 @@ use super::state::Path;
 use super::tracer::{MAX_STRAIGHT, PathTracer};
 use crate::bsdf::Bsdf;
 use crate::color::Rgb;
-use crate::embree::Ray;
+use crate::embree::{Hit, Ray};
 use crate::features::{Features, has};
 use crate::integrator::split::Spread;
 use crate::light::{EmitterId, LightSample};
@@ -90,7 +90,7 @@ impl<const F: u32> PathTracer<'_, F> {
         if pdf <= 0.0 {
             return None;
         }
-        let radiance = self.visible(surface, &light, rays)?;
+        let radiance = self.visible(path, surface, &light, rays)?;
         // The power heuristic's weight over the density; a delta light has no rival.
         let factor = if light.delta {
             1.0 / light.pdf
@@ -105,7 +105,13 @@ impl<const F: u32> PathTracer<'_, F> {
 
     /// The radiance of the light sample that reaches the surface; `None` when it
     /// is in shadow.
-    fn visible(&self, surface: &Surface, light: &LightSample, rays: &mut u32) -> Option<Rgb> {
+    fn visible(
+        &self,
+        path: &Path,
+        surface: &Surface,
+        light: &LightSample,
+        rays: &mut u32,
+    ) -> Option<Rgb> {
         let mut ray = surface.spawn(light.direction);
         ray.t_far = light.distance;
         let mut radiance = light.radiance;
@@ -120,6 +126,9 @@ impl<const F: u32> PathTracer<'_, F> {
             }
         }
         *rays += 1;
+        if has::<F>(Features::ABSORPTION) {
+            return self.visible_through_media(path, surface, ray, radiance, rays);
+        }
         if !has::<F>(Features::TRANSPARENCY) {
             return (!self.scene.accelerator.occluded(ray)).then_some(radiance);
         }
@@ -127,20 +136,54 @@ impl<const F: u32> PathTracer<'_, F> {
             let Some(hit) = self.scene.accelerator.intersect(ray) else {
                 return Some(radiance);
             };
-            let blocker = self.scene.surface::<F>(&ray, &hit);
-            let view = View {
-                wo: -ray.direction,
-                camera: false,
+            let (_, beyond) = self.through(ray, &hit, &mut radiance)?;
+            ray = beyond;
+            *rays += 1;
+        }
+        None
+    }
+
+    /// The blocker that a shadow ray has met, and the ray behind it; what is left of
+    /// `radiance`. `None` if that is nothing.
+    fn through(&self, ray: Ray, hit: &Hit, radiance: &mut Rgb) -> Option<(Surface, Ray)> {
+        let blocker = self.scene.surface::<F>(&ray, hit);
+        let view = View {
+            wo: -ray.direction,
+            camera: false,
+        };
+        *radiance *= self.scene.bsdf::<F>(&blocker, view).transparency();
+        if radiance.max_element() <= 0.0 {
+            return None;
+        }
+        let beyond = Ray {
+            t_far: ray.t_far - hit.t,
+            ..blocker.spawn(ray.direction)
+        };
+        Some((blocker, beyond))
+    }
+
+    /// The same where objects absorb that the ray goes through.
+    fn visible_through_media(
+        &self,
+        path: &Path,
+        surface: &Surface,
+        mut ray: Ray,
+        mut radiance: Rgb,
+        rays: &mut u32,
+    ) -> Option<Rgb> {
+        let mut media = path.media.clone();
+        if ray.direction.dot(surface.geometric_normal) < 0.0 {
+            media.cross(self.scene, surface);
+        }
+        for _ in 0..MAX_STRAIGHT {
+            let Some(hit) = self.scene.accelerator.intersect(ray) else {
+                radiance *= media.transmittance(ray.t_far);
+                return (radiance.max_element() > 0.0).then_some(radiance);
             };
-            radiance *= self.scene.bsdf::<F>(&blocker, view).transparency();
-            if radiance.max_element() <= 0.0 {
-                return None;
-            }
-            let t_far = ray.t_far - hit.t;
-            ray = Ray {
-                t_far,
-                ..blocker.spawn(ray.direction)
-            };
+            radiance *= media.transmittance(hit.t);
+            let (blocker, beyond) = self.through(ray, &hit, &mut radiance)?;
+            media.cross(self.scene, &blocker);
+            ray = beyond;
             *rays += 1;
         }
         None

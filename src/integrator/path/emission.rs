@@ -29,8 +29,13 @@ impl<const F: u32> PathTracer<'_, F> {
             &segment,
             last.receiver.normal,
             camera,
-            |radiance, light_pdf| {
-                sum += radiance * last.mis_weight(light_pdf);
+            |radiance, light_pdf, distance| {
+                let found = radiance * last.mis_weight(light_pdf);
+                sum += if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
+                    found * path.media.transmittance(distance - last.travelled)
+                } else {
+                    found
+                };
             },
         );
         sum
@@ -39,7 +44,10 @@ impl<const F: u32> PathTracer<'_, F> {
     /// What a ray that leaves the scene brings.
     pub(super) fn world(&self, path: &Path) -> Rgb {
         let lights = &self.scene.lights;
-        let (radiance, light_pdf) = lights.world(path.last.receiver, path.ray.direction);
+        let (mut radiance, light_pdf) = lights.world(path.last.receiver, path.ray.direction);
+        if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
+            radiance *= path.media.transmittance(f32::INFINITY);
+        }
         if has::<F>(Features::LIGHT_SAMPLING) {
             radiance * path.last.mis_weight(light_pdf)
         } else {

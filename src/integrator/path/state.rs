@@ -1,5 +1,6 @@
 //! A path on its way.
 
+use super::media::Media;
 use crate::bsdf::ByOrder;
 use crate::color::Rgb;
 use crate::embree::Ray;
@@ -21,6 +22,8 @@ pub(super) struct Path {
     pub bounce: u32,
     /// Distance from the ray's start to the surface that it meets.
     pub to_surface: f32,
+    /// What it is inside of.
+    pub media: Media,
 }
 
 /// The last vertex that light samples could have continued from.
@@ -50,6 +53,7 @@ impl Path {
             vertex: 0,
             bounce: 0,
             to_surface: 0.0,
+            media: Media::default(),
         }
     }
 

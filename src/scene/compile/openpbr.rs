@@ -1,7 +1,8 @@
 //! Compiles OpenPBR's surface.
 
-use super::super::material::{Layering, Leaf, OpenPbr};
+use super::super::material::{Layering, Leaf, Number, OpenPbr, Tint};
 use super::{Compiler, MaterialError};
+use crate::color::Rgb;
 use crate::description as desc;
 use crate::features::Features;
 
@@ -33,6 +34,21 @@ impl Compiler<'_> {
         if surface.coat_darkening != desc::Scalar::Value(1.0) {
             self.note("by walks a coat darkens as it does: coat_darkening is left out");
         }
+        let mut transmission_color = self.tint(&surface.transmission_color)?;
+        match (
+            self.number(&surface.transmission_depth)?,
+            transmission_color,
+        ) {
+            (Number::Constant(0.0), _) => {}
+            (Number::Constant(depth), Tint::Constant(color)) => {
+                if transmits {
+                    let color = color.max(Rgb::splat(f32::MIN_POSITIVE));
+                    self.fill(color.map(|c| -c.ln() / depth))?;
+                }
+                transmission_color = Tint::Constant(Rgb::ONE);
+            }
+            _ => return Err(MaterialError::TexturedInterior),
+        }
         let setup = self.setup_of(surface.tangent, !anisotropic, None, specular_ior, transmits)?;
         let mut leaf = OpenPbr {
             setup,
@@ -46,7 +62,7 @@ impl Compiler<'_> {
             specular_roughness_anisotropy: self.number(&surface.specular_roughness_anisotropy)?,
             specular_ior,
             transmission_weight: self.number(&surface.transmission_weight)?,
-            transmission_color: self.tint(&surface.transmission_color)?,
+            transmission_color,
             coat_weight: self.number(&surface.coat_weight)?,
             coat_color: self.tint(&surface.coat_color)?,
             coat_roughness: self.number(&surface.coat_roughness)?,

@@ -86,6 +86,8 @@ impl WeightedLeaf {
 pub struct Material {
     /// The leaves of the mix; one for a plain material.
     pub leaves: Vec<WeightedLeaf>,
+    /// What the inside of objects of this material absorbs, m⁻¹.
+    pub interior: Option<Rgb>,
 }
 
 impl Material {
