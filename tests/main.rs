@@ -12,7 +12,6 @@ mod cycles;
 mod description;
 mod description_files;
 mod diff;
-mod explicit_stack;
 mod extreme_scenes;
 mod extremes;
 mod film_files;
