@@ -64,6 +64,8 @@ features! {
     LAYERS = 21, "layers", "walks among interfaces in sampling and evaluation";
     /// Objects that are filled with something that absorbs.
     ABSORPTION = 22, "absorption", "the media that a path is in, and what they leave of it, per ray";
+    /// Facets with the normals of the quadratic distribution.
+    QUADRATIC = 23, "quadratic normals", "a third distribution in every rough closure";
 }
 
 impl Features {

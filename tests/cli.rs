@@ -133,6 +133,51 @@ fn eval_agrees_between_estimators() {
     }
 }
 
+/// White mirrors with quadratic normals have f = (cosθ_o + cosθ_i) / (π (1 + ω_o·ω_i))
+/// (Dupuy 2026); 5 standard errors: false alarm 6e-7 each.
+#[test]
+fn quadratic_mirrors_have_their_closed_form() {
+    for (wo, wi) in [
+        ([0.6, 0.0, 0.8], [-0.48, 0.64, 0.6]),
+        ([0.8, 0.0, 0.6], [0.0, 0.96, 0.28]),
+    ] {
+        let text = |w: [f64; 3]| w.map(|x| x.to_string()).join(",");
+        let report = json(&[
+            "bsdf",
+            "eval",
+            "--material",
+            "conductor: {distribution: quadratic}",
+            "--wo",
+            &text(wo),
+            "--wi",
+            &text(wi),
+            "--json",
+        ]);
+        let dot: f64 = wo.iter().zip(wi).map(|(a, b)| a * b).sum();
+        let exact = wi[2] * (wo[2] + wi[2]) / (std::f64::consts::PI * (1.0 + dot));
+        let (value, se) = (numbers(&report["value"])[1], numbers(&report["se"])[1]);
+        assert!(se < 0.01 * exact);
+        assert!(
+            (value - exact).abs() < 5.0 * se + 1e-6 * exact,
+            "{value} ± {se} against {exact}"
+        );
+    }
+    let refused = smithwalk(&[
+        "bsdf",
+        "albedo",
+        "--cos",
+        "1",
+        "--material",
+        "conductor: {distribution: quadratic, alpha: 0.5}",
+    ]);
+    assert_eq!(refused.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        message.contains("the quadratic distribution has no roughness"),
+        "{message}"
+    );
+}
+
 #[test]
 fn sample_writes_columns_of_one_length() {
     let table = json(&[

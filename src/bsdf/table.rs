@@ -8,12 +8,12 @@ use super::{BsdfSample, Method, Rough};
 use crate::features::{Features, has};
 use smithwalk_model::{
     Beckmann, Conductor, Dielectric, Diffuse, Draw, Facets, Ggx, Glass, Microsurface, Ndf,
-    NdfInLanes, Refraction, Tally,
+    NdfInLanes, Quadratic, Refraction, Tally,
 };
 
 /// What the renderer asks of a distribution beside [`Ndf`].
 pub trait Width: Ndf<Scalar = f32> {
-    /// With these slope roughnesses along x and y.
+    /// With these slope roughnesses along x and y, if it has any.
     fn of(alpha_x: f32, alpha_y: f32) -> Self;
 
     /// The slope roughnesses along x and y.
@@ -27,10 +27,42 @@ pub trait Width: Ndf<Scalar = f32> {
     }
 }
 
+/// What the renderer asks of a distribution; of one without a roughness if it
+/// is called `constant`.
+macro_rules! width {
+    ($ndf:ident) => {
+        impl Width for $ndf<f32> {
+            #[inline]
+            fn of(alpha_x: f32, alpha_y: f32) -> Self {
+                Self { alpha_x, alpha_y }
+            }
+
+            #[inline]
+            fn alphas(&self) -> [f32; 2] {
+                [self.alpha_x, self.alpha_y]
+            }
+        }
+    };
+    ($ndf:ident constant) => {
+        impl Width for $ndf<f32> {
+            #[inline]
+            fn of(_: f32, _: f32) -> Self {
+                Self::new()
+            }
+
+            /// About what its slopes have.
+            #[inline]
+            fn alphas(&self) -> [f32; 2] {
+                [1.0; 2]
+            }
+        }
+    };
+}
+
 /// Declares distributions with the feature that each needs beside those of its
 /// facets.
 macro_rules! distributions {
-    ($($(#[$doc:meta])* $ndf:ident: $feature:expr;)*) => {
+    ($($(#[$doc:meta])* $ndf:ident $($constant:ident)?: $feature:expr;)*) => {
         /// The distribution of facet normals.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -110,17 +142,7 @@ macro_rules! distributions {
             }
         }
 
-        $(impl Width for $ndf<f32> {
-            #[inline]
-            fn of(alpha_x: f32, alpha_y: f32) -> Self {
-                Self { alpha_x, alpha_y }
-            }
-
-            #[inline]
-            fn alphas(&self) -> [f32; 2] {
-                [self.alpha_x, self.alpha_y]
-            }
-        })*
+        $(width!($ndf $($constant)?);)*
 
         /// Runs `$body` with `$name` standing for the distribution's type.
         macro_rules! with_ndf {
@@ -225,6 +247,8 @@ distributions! {
     Ggx: Features::NONE;
     /// Gaussian slopes.
     Beckmann: Features::BECKMANN;
+    /// D(m) ∝ m_z², without a roughness.
+    Quadratic constant: Features::QUADRATIC;
 }
 
 facets! {
@@ -238,6 +262,14 @@ facets! {
     Refraction: Features::SPLIT_GLASS;
     /// Interfaces whose reflection and transmission are coloured apart.
     Glass: Features::SPLIT_GLASS;
+}
+
+impl Distribution {
+    /// Whether it comes in widths.
+    #[must_use]
+    pub const fn has_roughness(self) -> bool {
+        !matches!(self, Self::Quadratic)
+    }
 }
 
 #[expect(

@@ -4,7 +4,7 @@ use super::filled::Filled;
 use super::layered::Layered;
 use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
-use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness};
+use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar, visit_numbers};
 use serde::Deserialize;

@@ -99,10 +99,11 @@ macro_rules! raw_rough {
             impl $raw {
                 fn rough(&mut self) -> Result<Rough, Clash> {
                     let alphas = [self.alpha.take(), self.alpha_x.take(), self.alpha_y.take()];
+                    let blender = [self.roughness.take(), self.anisotropy.take()];
                     Ok(Rough {
                         distribution: self.distribution,
                         scattering: self.scattering,
-                        roughness: roughness(alphas, self.roughness.take(), self.anisotropy.take())?,
+                        roughness: roughness_of(self.distribution, alphas, blender)?,
                         rotation: self.rotation.take().unwrap_or(Scalar::Value(0.0)),
                         tangent: self.tangent,
                     })
@@ -112,8 +113,34 @@ macro_rules! raw_rough {
     };
 }
 
+/// Roughness where the distribution has one.
+pub(super) fn roughness_of(
+    distribution: Distribution,
+    alphas: [Option<Scalar>; 3],
+    [rough, anisotropy]: [Option<Scalar>; 2],
+) -> Result<Roughness, Clash> {
+    if distribution.has_roughness() {
+        return roughness(alphas, rough, anisotropy);
+    }
+    let [alpha, alpha_x, alpha_y] = &alphas;
+    let given = [
+        ("alpha", alpha),
+        ("alpha_x", alpha_x),
+        ("alpha_y", alpha_y),
+        ("roughness", &rough),
+        ("anisotropy", &anisotropy),
+    ];
+    match given.into_iter().find(|(_, value)| value.is_some()) {
+        Some((key, _)) => Err(Clash::new(
+            key,
+            "the quadratic distribution has no roughness",
+        )),
+        None => Ok(Roughness::Alpha(Scalar::Value(1.0))),
+    }
+}
+
 /// Roughness in one of the ways that a file may say it.
-pub(super) fn roughness(
+fn roughness(
     [alpha, alpha_x, alpha_y]: [Option<Scalar>; 3],
     roughness: Option<Scalar>,
     anisotropy: Option<Scalar>,
