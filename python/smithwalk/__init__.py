@@ -185,6 +185,7 @@ def conductor(
     *,
     alpha: float | tuple[float, float] | None = None,
     distribution: str = "ggx",
+    gamma: float | None = None,
     color: ArrayLike | None = None,
     eta: ArrayLike | None = None,
     k: ArrayLike | None = None,
@@ -192,59 +193,63 @@ def conductor(
     """Metal facets, by reflectance `color` at all angles, or by complex index `eta` + i `k`.
 
     `alpha`: slope roughness α (not its square root), one number or (α_x along the
-    tangent, α_y); not for `distribution='quadratic'`, which has none. `color`:
+    tangent, α_y); not for `distribution='quadratic'`, which has none. `distribution`:
+    'ggx', 'beckmann', 'student-t' or 'quadratic'. `gamma`: exponent of 'student-t',
+    above 1.5: 2 is GGX, large ones go to Beckmann (Ribardière et al. 2017). `color`:
     0 to 1, one number or three; default 1. `eta`, `k`: relative to the outside,
     one number or three each.
     """
-    width = _alpha(distribution, alpha)
+    normals = _normals(distribution, alpha, gamma)
     if color is not None and (eta is not None or k is not None):
         raise ValueError("color: give either color or eta and k, not both")
     if (eta is None) != (k is None):
         raise ValueError(f"{'eta' if eta is None else 'k'}: eta and k go together")
-    shown = f"conductor({_shown(distribution, alpha)}"
+    shown = f"conductor({_shown(distribution, alpha, gamma)}"
     if eta is not None:
         eta, k = _channels("eta", eta, 0.0, np.inf), _channels("k", k, 0.0, np.inf)
         if min(eta) <= 0.0:
             raise ValueError("eta: expected numbers above 0")
-        surface = _smithwalk.Surface.conductor_complex(distribution, width, eta, k)
+        surface = _smithwalk.Surface.conductor_complex(normals, eta, k)
         return Material(surface, f"{shown}, eta={eta}, k={k})")
     color = _channels("color", 1.0 if color is None else color, 0.0, 1.0)
-    return Material(_smithwalk.Surface.conductor_color(distribution, width, color), f"{shown}, color={color})")
+    return Material(_smithwalk.Surface.conductor_color(normals, color), f"{shown}, color={color})")
 
 
 def dielectric(
     *,
     alpha: float | tuple[float, float] | None = None,
     distribution: str = "ggx",
+    gamma: float | None = None,
     eta: float = 1.5,
     color: ArrayLike = 1.0,
 ) -> Material:
     """Glass facets that reflect and refract.
 
-    `alpha`, `distribution`: as for `conductor`. `eta`: index of refraction of the
+    `alpha`, `distribution`, `gamma`: as for `conductor`. `eta`: index of refraction of the
     inside (z < 0) over that of the outside. `color`: what every facet multiplies
     the light by, 0 to 1.
     """
-    width = _alpha(distribution, alpha)
+    normals = _normals(distribution, alpha, gamma)
     eta = float(eta)
     if not (0.0 < eta < np.inf):
         raise ValueError(f"eta: expected a number above 0, found {eta}")
     color = _channels("color", color, 0.0, 1.0)
-    surface = _smithwalk.Surface.dielectric(distribution, width, eta, color)
-    return Material(surface, f"dielectric({_shown(distribution, alpha)}, eta={eta}, color={color})")
+    surface = _smithwalk.Surface.dielectric(normals, eta, color)
+    return Material(surface, f"dielectric({_shown(distribution, alpha, gamma)}, eta={eta}, color={color})")
 
 
 def diffuse(
     *,
     alpha: float | tuple[float, float] | None = None,
     distribution: str = "ggx",
+    gamma: float | None = None,
     color: ArrayLike = 1.0,
 ) -> Material:
-    """Lambertian facets of albedo `color`, 0 to 1. `alpha`, `distribution`: as for `conductor`."""
-    width = _alpha(distribution, alpha)
+    """Lambertian facets of albedo `color`, 0 to 1. `alpha`, `distribution`, `gamma`: as for `conductor`."""
+    normals = _normals(distribution, alpha, gamma)
     color = _channels("color", color, 0.0, 1.0)
-    surface = _smithwalk.Surface.diffuse(distribution, width, color)
-    return Material(surface, f"diffuse({_shown(distribution, alpha)}, color={color})")
+    surface = _smithwalk.Surface.diffuse(normals, color)
+    return Material(surface, f"diffuse({_shown(distribution, alpha, gamma)}, color={color})")
 
 
 def _alpha(distribution: str, alpha: float | tuple[float, float] | None) -> tuple[float, float]:
@@ -261,8 +266,20 @@ def _alpha(distribution: str, alpha: float | tuple[float, float] | None) -> tupl
     return (float(x), float(y))
 
 
-def _shown(distribution: str, alpha: object) -> str:
-    return f"distribution={distribution!r}" + ("" if alpha is None else f", alpha={alpha}")
+def _normals(
+    distribution: str, alpha: float | tuple[float, float] | None, gamma: float | None
+) -> tuple[str, tuple[float, float], float]:
+    if (gamma is None) == (distribution == "student-t"):
+        raise ValueError("gamma: belongs to the distribution 'student-t', which needs it")
+    exponent = 2.0 if gamma is None else float(gamma)
+    if not (1.5 < exponent < np.inf):
+        raise ValueError(f"gamma: expected a number above 1.5, found {gamma}")
+    return (distribution, _alpha(distribution, alpha), exponent)
+
+
+def _shown(distribution: str, alpha: object, gamma: object) -> str:
+    shown = f"distribution={distribution!r}" + ("" if alpha is None else f", alpha={alpha}")
+    return shown + ("" if gamma is None else f", gamma={gamma}")
 
 
 def _channels(name: str, value: ArrayLike, least: float, most: float) -> tuple[float, float, float]:

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Facets, Ggx, Quadratic,
-    Rgb, Vector3,
+    Rgb, StudentT, Vector3,
 };
 
 use crate::measure::{self, Albedo};
@@ -16,7 +16,10 @@ use crate::scatter::{Method, Sides};
 #[pyclass(frozen)]
 pub struct Surface(Sides);
 
-fn with<I>(distribution: &str, alpha: [f64; 2], facets: I) -> PyResult<Surface>
+/// A distribution of normals: its name, α_x and α_y, and γ for Student's.
+type Normals<'a> = (&'a str, [f64; 2], f64);
+
+fn with<I>((distribution, alpha, gamma): Normals<'_>, facets: I) -> PyResult<Surface>
 where
     I: Facets<Scalar = f64> + Send + Sync + 'static,
 {
@@ -25,9 +28,17 @@ where
         "ggx" => Sides::of(Ggx { alpha_x, alpha_y }, facets),
         "beckmann" => Sides::of(Beckmann { alpha_x, alpha_y }, facets),
         "quadratic" => Sides::of(Quadratic::new(), facets),
+        "student-t" => {
+            let ndf = StudentT {
+                alpha_x,
+                alpha_y,
+                gamma,
+            };
+            Sides::of(ndf, facets)
+        }
         other => {
             return Err(PyValueError::new_err(format!(
-                "distribution: expected 'ggx', 'beckmann' or 'quadratic', found {other:?}"
+                "distribution: expected 'ggx', 'beckmann', 'student-t' or 'quadratic', found {other:?}"
             )));
         }
     };
@@ -77,35 +88,30 @@ fn columns<'py>(py: Python<'py>, found: Vec<measure::Estimate>) -> Columns<'py> 
 #[pymethods]
 impl Surface {
     #[staticmethod]
-    fn conductor_color(distribution: &str, alpha: [f64; 2], color: [f64; 3]) -> PyResult<Self> {
+    fn conductor_color(normals: Normals<'_>, color: [f64; 3]) -> PyResult<Self> {
         let fresnel = ConductorFresnel::Constant(Rgb(color));
-        with(distribution, alpha, Conductor { fresnel })
+        with(normals, Conductor { fresnel })
     }
 
     #[staticmethod]
-    fn conductor_complex(
-        distribution: &str,
-        alpha: [f64; 2],
-        eta: [f64; 3],
-        k: [f64; 3],
-    ) -> PyResult<Self> {
+    fn conductor_complex(normals: Normals<'_>, eta: [f64; 3], k: [f64; 3]) -> PyResult<Self> {
         let fresnel = ConductorFresnel::Complex {
             eta: Rgb(eta),
             k: Rgb(k),
         };
-        with(distribution, alpha, Conductor { fresnel })
+        with(normals, Conductor { fresnel })
     }
 
     #[staticmethod]
-    fn dielectric(distribution: &str, alpha: [f64; 2], eta: f64, tint: [f64; 3]) -> PyResult<Self> {
+    fn dielectric(normals: Normals<'_>, eta: f64, tint: [f64; 3]) -> PyResult<Self> {
         let tint = Rgb(tint);
-        with(distribution, alpha, Dielectric { eta, tint })
+        with(normals, Dielectric { eta, tint })
     }
 
     #[staticmethod]
-    fn diffuse(distribution: &str, alpha: [f64; 2], albedo: [f64; 3]) -> PyResult<Self> {
+    fn diffuse(normals: Normals<'_>, albedo: [f64; 3]) -> PyResult<Self> {
         let albedo = Rgb(albedo);
-        with(distribution, alpha, Diffuse { albedo })
+        with(normals, Diffuse { albedo })
     }
 
     fn eval<'py>(

@@ -73,6 +73,17 @@ def test_nothing_is_lost_without_absorption():
         assert (found.mean_order >= 1.0).all()
 
 
+def test_students_distribution_is_ggx_at_two_and_goes_to_beckmann():
+    wi, wo = smithwalk.spherical(0.6), smithwalk.spherical([0.9, 0.4], [1.0, 3.0])
+    for other, gamma, slack in (("ggx", 2.0, 1e-9), ("beckmann", 1e5, 1e-3)):
+        student = smithwalk.conductor(alpha=0.6, distribution="student-t", gamma=gamma)
+        exact, _ = smithwalk.conductor(alpha=0.6, distribution=other).eval(wi, wo, estimator="single", samples=1)
+        first, _ = student.eval(wi, wo, estimator="single", samples=1)
+        np.testing.assert_allclose(first, exact, rtol=slack)
+    tails = smithwalk.conductor(alpha=0.6, distribution="student-t", gamma=1.7).albedo([0.9, 0.2], samples=20_000)
+    np.testing.assert_allclose(tails.reflected, 1.0, atol=1e-9)
+
+
 def test_values_integrate_to_albedos():
     gold = smithwalk.conductor(alpha=0.7, color=(1.0, 0.71, 0.29))
     n = 64
@@ -189,6 +200,9 @@ def test_the_same_for_any_number_of_threads():
         (lambda m: smithwalk.conductor(alpha=0.5, distribution="phong"), "distribution: expected"),
         (lambda m: smithwalk.conductor(alpha=0.5, distribution="quadratic"), "alpha: the quadratic"),
         (lambda m: smithwalk.dielectric(alpha=0.5, eta=0), "eta: expected"),
+        (lambda m: smithwalk.conductor(alpha=0.5, gamma=3), "gamma: belongs to"),
+        (lambda m: smithwalk.conductor(alpha=0.5, distribution="student-t"), "gamma: belongs to"),
+        (lambda m: smithwalk.conductor(alpha=0.5, distribution="student-t", gamma=1.5), "gamma: expected"),
     ],
 )
 def test_errors_name_the_argument(call, words):

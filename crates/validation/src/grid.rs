@@ -1,7 +1,7 @@
 //! The configurations that are checked.
 
 use super::model::Distribution;
-use smithwalk_model::Vector3;
+use smithwalk_model::{StudentT, Vector3};
 
 /// How much is checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,8 @@ impl Effort {
         }
     }
 
-    /// GGX and Beckmann over roughness and anisotropy, and the quadratic one.
+    /// GGX and Beckmann over roughness and anisotropy, the quadratic one, and Student's
+    /// t-distribution between them. (Its longer tails, γ < 2, are beyond the quadrature.)
     pub fn distributions(self) -> Vec<Distribution> {
         let alphas: &[(f64, f64)] = self.pick(
             &[(0.01, 0.01), (0.5, 0.5), (2.0, 2.0), (1.0, 0.05)],
@@ -41,6 +42,23 @@ impl Effort {
         for &(alpha_x, alpha_y) in alphas {
             all.extend(Distribution::of_roughness(alpha_x, alpha_y));
         }
+        let students: &[(f64, f64, f64)] = self.pick(
+            &[(0.5, 0.5, 2.5), (1.0, 0.2, 4.0)],
+            &[
+                (0.2, 0.2, 2.5),
+                (0.5, 0.5, 2.5),
+                (0.5, 0.5, 4.0),
+                (1.0, 1.0, 3.0),
+                (1.0, 0.2, 20.0),
+            ],
+        );
+        all.extend(students.iter().map(|&(alpha_x, alpha_y, gamma)| {
+            Distribution::StudentT(StudentT {
+                alpha_x,
+                alpha_y,
+                gamma,
+            })
+        }));
         all
     }
 

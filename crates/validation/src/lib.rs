@@ -25,7 +25,7 @@ mod model;
 pub mod orders;
 mod phases;
 pub mod plot;
-mod points;
+pub mod points;
 pub mod precision;
 mod second_order;
 mod slopes;

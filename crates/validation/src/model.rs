@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Draw, Estimator, Exit, Facets, Ggx,
-    Microsurface, Ndf, Quadratic, Rgb, Stream, Tally, Vector3,
+    Microsurface, Ndf, Quadratic, Rgb, Stream, StudentT, Tally, Vector3,
 };
 
 /// The random numbers of a check.
@@ -28,6 +28,8 @@ pub enum Distribution {
     Ggx(Ggx<f64>),
     /// Gaussian slopes.
     Beckmann(Beckmann<f64>),
+    /// Slopes of Student's distribution.
+    StudentT(StudentT<f64>),
     /// The one with closed-form mirrors.
     Quadratic,
 }
@@ -47,6 +49,7 @@ impl Distribution {
         match self {
             Self::Ggx(d) => (d.alpha_x, d.alpha_y),
             Self::Beckmann(d) => (d.alpha_x, d.alpha_y),
+            Self::StudentT(d) => (d.alpha_x, d.alpha_y),
             Self::Quadratic => (1.0, 1.0),
         }
     }
@@ -54,8 +57,9 @@ impl Distribution {
     /// Its name and roughness.
     pub fn name(self) -> String {
         let name = match self {
-            Self::Ggx(_) => "GGX",
-            Self::Beckmann(_) => "Beckmann",
+            Self::Ggx(_) => "GGX".to_owned(),
+            Self::Beckmann(_) => "Beckmann".to_owned(),
+            Self::StudentT(d) => format!("Student t γ {},", d.gamma),
             Self::Quadratic => return "quadratic".into(),
         };
         let (x, y) = self.alpha();
@@ -74,6 +78,7 @@ impl Ndf for Distribution {
         match self {
             Self::Ggx(d) => d.density(m),
             Self::Beckmann(d) => d.density(m),
+            Self::StudentT(d) => d.density(m),
             Self::Quadratic => Quadratic::new().density(m),
         }
     }
@@ -82,6 +87,7 @@ impl Ndf for Distribution {
         match self {
             Self::Ggx(d) => d.projected_area(w),
             Self::Beckmann(d) => d.projected_area(w),
+            Self::StudentT(d) => d.projected_area(w),
             Self::Quadratic => Quadratic::new().projected_area(w),
         }
     }
@@ -90,6 +96,7 @@ impl Ndf for Distribution {
         match self {
             Self::Ggx(d) => d.sample_visible(w, u),
             Self::Beckmann(d) => d.sample_visible(w, u),
+            Self::StudentT(d) => d.sample_visible(w, u),
             Self::Quadratic => Quadratic::new().sample_visible(w, u),
         }
     }

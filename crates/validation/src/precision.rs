@@ -5,7 +5,8 @@ use super::grid::Effort;
 use super::model::Distribution;
 use serde::Serialize;
 use smithwalk_model::{
-    Beckmann, Conductor, ConductorFresnel, Ggx, Microsurface, Ndf, Quadratic, Rgb, Vector3,
+    Beckmann, Conductor, ConductorFresnel, Ggx, Microsurface, Ndf, Quadratic, Rgb, StudentT,
+    Vector3,
 };
 
 /// The largest relative difference that is allowed.
@@ -133,6 +134,20 @@ pub fn table(effort: Effort) -> Vec<PrecisionRow> {
                 alpha_y: alpha_y.into(),
             };
             rows(d, Beckmann { alpha_x, alpha_y }, double, &views)
+        }
+        Distribution::StudentT(s) => {
+            let [alpha_x, alpha_y, gamma] = [s.alpha_x, s.alpha_y, s.gamma].map(|x| x as f32);
+            let double = StudentT {
+                alpha_x: alpha_x.into(),
+                alpha_y: alpha_y.into(),
+                gamma: gamma.into(),
+            };
+            let single = StudentT {
+                alpha_x,
+                alpha_y,
+                gamma,
+            };
+            rows(d, single, double, &views)
         }
         Distribution::Quadratic => rows(d, Quadratic::new(), Quadratic::new(), &views),
     });

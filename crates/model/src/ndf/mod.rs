@@ -3,10 +3,12 @@
 mod beckmann;
 mod ggx;
 mod quadratic;
+mod student_t;
 
 pub use beckmann::Beckmann;
 pub use ggx::Ggx;
 pub use quadratic::Quadratic;
+pub use student_t::StudentT;
 
 use num_traits::{Float, Zero};
 
