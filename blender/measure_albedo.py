@@ -4,7 +4,7 @@
     PYTHONPATH=<bpy> python3 blender/measure_albedo.py OUT_DIR
 
 Writes OUT_DIR/cycles_<major.minor>_albedo_conductor.csv and
-…_dielectric.csv; tests/data holds those of 3.4 and 4.5.
+…_dielectric.csv; tests/data holds those of 3.4, 4.5 and 5.0.
 
 A sheet of square patches, one material each, lies in the plane z = 0 and an
 orthographic camera looks at it with view direction ω_o = (0, −sinθ, cosθ).

@@ -31,5 +31,6 @@ pub mod numbered;
 pub mod report;
 pub mod sampler;
 pub mod scene;
+pub mod tables;
 pub mod text;
 pub mod texture;

@@ -24,4 +24,5 @@ mod light;
 mod parity;
 mod render;
 mod shading_normals;
+mod tables;
 mod validate;

@@ -3,6 +3,7 @@
 mod albedo;
 mod eval;
 mod sample;
+mod table;
 mod tail;
 
 use std::io::Write;
@@ -10,7 +11,6 @@ use std::process::ExitCode;
 
 use anyhow::ensure;
 use glam::Vec3;
-use smithwalk::color::Rgb;
 use smithwalk::description::{self, Estimator};
 use smithwalk::scene::{Material, compile_alone};
 use smithwalk_model::Stream;
@@ -23,6 +23,8 @@ pub enum Command {
     Eval(eval::Args),
     /// Sampled directions with weights
     Sample(sample::Args),
+    /// Tables for other programs: npz, EXR, measured materials of RGL and MERL
+    Table(table::Args),
 }
 
 pub fn run(
@@ -34,6 +36,7 @@ pub fn run(
         Command::Albedo(args) => albedo::run(args, out)?,
         Command::Eval(args) => eval::run(args, out, log)?,
         Command::Sample(args) => sample::run(args, out)?,
+        Command::Table(args) => table::run(args, out)?,
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -97,43 +100,3 @@ const LEVEL: f64 = 1e-7;
 
 /// The most samples that a command takes: those of days.
 const MOST_SAMPLES: u64 = 100_000_000_000;
-
-/// Mean, standard error and largest channels of colours, summed in f64.
-#[derive(Clone, Copy, Default)]
-struct Moments {
-    sum: [f64; 3],
-    squares: [f64; 3],
-    largest: [f64; 3],
-}
-
-impl Moments {
-    fn add(&mut self, value: Rgb) {
-        for (channel, x) in value.to_array().into_iter().enumerate() {
-            let x = f64::from(x);
-            self.sum[channel] += x;
-            self.squares[channel] += x * x;
-            self.largest[channel] = self.largest[channel].max(x);
-        }
-    }
-
-    fn merge(&mut self, other: &Self) {
-        for channel in 0..3 {
-            self.sum[channel] += other.sum[channel];
-            self.squares[channel] += other.squares[channel];
-            self.largest[channel] = self.largest[channel].max(other.largest[channel]);
-        }
-    }
-
-    fn mean(&self, n: u64) -> [f64; 3] {
-        self.sum.map(|sum| sum / n as f64)
-    }
-
-    /// Standard error of the mean.
-    fn standard_error(&self, n: u64) -> [f64; 3] {
-        let n = n as f64;
-        [0, 1, 2].map(|c| {
-            let mean = self.sum[c] / n;
-            ((self.squares[c] / n - mean * mean).max(0.0) / (n - 1.0).max(1.0)).sqrt()
-        })
-    }
-}

@@ -1,6 +1,7 @@
 //! The subcommands, one file each.
 
 mod bsdf;
+mod conform;
 mod converge;
 mod diff;
 mod film;
@@ -44,6 +45,8 @@ enum Command {
     Furnace(furnace::Args),
     /// Test the microsurface model against what must hold for it
     Validate(validate::Args),
+    /// Judge somebody's table of albedos or of f by the model, row by row
+    Conform(conform::Args),
     /// Measure a material
     #[command(subcommand)]
     Bsdf(bsdf::Command),
@@ -61,6 +64,7 @@ impl Cli {
             Command::Converge(args) => converge::run(args, out, log),
             Command::Furnace(args) => furnace::run(args, out, log),
             Command::Validate(args) => validate::run(args, out, log),
+            Command::Conform(args) => conform::run(args, out),
             Command::Bsdf(command) => bsdf::run(command, out, log),
         }
     }

@@ -44,6 +44,8 @@ pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
 pub use value::{Color, Scalar};
 
+pub(crate) use problem::nearest;
+
 use document::Node;
 use problem::Sources;
 

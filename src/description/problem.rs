@@ -234,7 +234,7 @@ impl<'a> Sources<'a> {
 }
 
 /// The candidate that looks most like `name`, if any looks alike.
-pub(super) fn nearest<'a>(
+pub(crate) fn nearest<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {

@@ -8,10 +8,8 @@ pub(crate) mod planes;
 mod window;
 
 pub use exr::{ExrError, read_exr};
-pub use output::{OutputError, OutputPath, check_output};
+pub use output::{OutputError, OutputPath, check_output, replace};
 pub use window::Window;
-
-pub(crate) use output::replace;
 
 /// An image with its layers, as developed from a film or read from a file.
 #[derive(Clone, Debug, PartialEq)]

@@ -161,7 +161,7 @@ pub fn check_output(path: &Path) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// When the system refuses; a file that was there before stays.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let failed = |error: std::io::Error| OutputError::Write {
         path: path.to_owned(),
         reason: error.to_string(),

@@ -1,5 +1,6 @@
 //! Reports: what was measured, as tables, figures and pages.
 
+pub mod conform;
 pub mod converge;
 pub mod heightfield;
 pub mod validate;

@@ -7,9 +7,10 @@ use rayon::prelude::*;
 use serde_json::json;
 use smithwalk::bsdf::Bsdf;
 use smithwalk::description::Estimator;
+use smithwalk::tables::Moments;
 use smithwalk_model::Draw;
 
-use super::{LEVEL, MOST_SAMPLES, MaterialArgs, Moments};
+use super::{LEVEL, MOST_SAMPLES, MaterialArgs};
 
 #[derive(clap::Args)]
 pub struct Args {

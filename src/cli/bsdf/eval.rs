@@ -7,11 +7,12 @@ use anyhow::ensure;
 use glam::Vec3;
 use serde_json::json;
 use smithwalk::color::Rgb;
+use smithwalk::tables::Moments;
 use smithwalk_model::PerOrder;
 
 use super::super::render::EstimatorName;
 use super::tail::{HEAVY, Tail};
-use super::{MOST_SAMPLES, MaterialArgs, Moments, parse_direction};
+use super::{MOST_SAMPLES, MaterialArgs, parse_direction};
 
 #[derive(clap::Args)]
 pub struct Args {

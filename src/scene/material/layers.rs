@@ -112,9 +112,9 @@ impl LayeredMaterial {
         Some((Closure::Layered(Stack::new(stack, point.front)), frame))
     }
 
-    /// Whether the tangent runs round an axis of the object.
-    pub(super) fn is_radial(&self) -> bool {
-        matches!(self.tangent, Tangent::Radial(_))
+    /// Where the tangent points.
+    pub(super) fn tangent(&self) -> Tangent {
+        self.tangent
     }
 
     /// Whether light gets through.

@@ -244,17 +244,28 @@ impl Material {
         })
     }
 
+    /// Where the tangents of its leaves point.
+    fn tangents(&self) -> impl Iterator<Item = Tangent> {
+        self.leaves.iter().filter_map(|l| match &l.leaf {
+            Leaf::Rough(rough) => Some(rough.tangent),
+            Leaf::Layered(layers) => Some(layers.tangent()),
+            Leaf::Principled3(node) => Some(node.setup.tangent),
+            Leaf::Principled4(node) => Some(node.setup.tangent),
+            Leaf::OpenPbr(node) => Some(node.setup.tangent),
+            _ => None,
+        })
+    }
+
     /// Whether a tangent runs round an axis of the object.
     #[must_use]
     pub fn has_radial_tangent(&self) -> bool {
-        self.leaves.iter().any(|l| match &l.leaf {
-            Leaf::Rough(rough) => matches!(rough.tangent, Tangent::Radial(_)),
-            Leaf::Layered(layers) => layers.is_radial(),
-            Leaf::Principled3(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
-            Leaf::Principled4(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
-            Leaf::OpenPbr(node) => matches!(node.setup.tangent, Tangent::Radial(_)),
-            _ => false,
-        })
+        self.tangents().any(|t| matches!(t, Tangent::Radial(_)))
+    }
+
+    /// Whether it may look different when it is turned about the normal.
+    #[must_use]
+    pub fn has_tangent(&self) -> bool {
+        self.tangents().any(|tangent| tangent != Tangent::Any)
     }
 
     /// The colour that a noise filter or a compositor takes for the albedo.
