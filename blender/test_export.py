@@ -158,6 +158,14 @@ class ExportTest(unittest.TestCase):
             area += signed
         self.assertAlmostEqual(area, 3.0)
 
+    def test_normals_far_from_the_faces_are_named(self):
+        for make, named in ((bpy.ops.mesh.primitive_uv_sphere_add, False), (bpy.ops.mesh.primitive_cylinder_add, True)):
+            make()
+            ob = bpy.context.object
+            ob.data.polygons.foreach_set("use_smooth", [True] * len(ob.data.polygons))
+            self.export()
+            self.assertEqual(any("smooth normals lean" in loss for loss in self.losses()), named, self.losses())
+
     def test_materials_per_face_and_object_slots(self):
         """Faces go to `usemtl slot_n`; a slot linked to the object overrides the mesh's."""
         ob = self.cube()

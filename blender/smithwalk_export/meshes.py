@@ -15,6 +15,7 @@ import re
 import numpy as np
 
 FARTHEST = 1e18    # metres: squares of larger coordinates leave single precision
+LEAN = 25.0        # degrees between a corner's normal and its face's, from which Cycles looks otherwise
 _LINES = 100_000  # formatted at a time: bounds the memory of the text
 
 
@@ -77,6 +78,10 @@ class MeshWriter:
                                                  "finite, or out of reach, are left out")
         if not arrays.slots:
             return None
+        if arrays.leaning > 0.02:
+            self.log.warn(f'object "{ob.name}"', f"smooth normals lean by up to {arrays.lean:.0f}° from faces of "
+                          f"{100 * arrays.leaning:.0f} % of the area: light that Cycles loses or bends there is "
+                          "kept, and goes elsewhere (shade smooth by angle would help both)")
         same = self._same(arrays)
         name = self._names.get(same)
         if name is None:
@@ -107,6 +112,25 @@ def _corner_normals(mesh):
         mesh.calc_normals_split()
         return _floats(mesh.loops, "normal", 3, count)
     return _floats(mesh.corner_normals, "vector", 3, count)
+
+
+def _lean(mesh, normals):
+    """The largest angle between a corner's normal and its face's, degrees, and the share of
+    the area of faces where it is above `LEAN`."""
+    count = len(mesh.polygons)
+    smooth = np.empty(count, dtype=bool)
+    mesh.polygons.foreach_get("use_smooth", smooth)
+    if not smooth.any():
+        return 0.0, 0.0
+    faces = _floats(mesh.polygons, "normal", 3, count)
+    areas = _floats(mesh.polygons, "area", 1, count)[:, 0]
+    starts = _integers(mesh.polygons, "loop_start", count)
+    corners = np.repeat(faces, _integers(mesh.polygons, "loop_total", count), axis=0)
+    least = np.minimum.reduceat(np.einsum("ij,ij->i", corners, normals), starts)
+    least = np.where((areas > 0.0) & np.isfinite(areas), least, 1.0)
+    lean = np.degrees(np.arccos(np.clip(least.min(), -1.0, 1.0)))
+    leaning = least < np.cos(np.radians(LEAN))
+    return float(lean), float(areas[leaning].sum() / max(np.nansum(areas), 1e-30))
 
 
 def _indexed(keys, rows, vertex_of, count):
@@ -187,9 +211,11 @@ class Arrays:
         # brought to the scene: it is shaded flat, as it is.
         flattened = transform is not None
         self.normals = normal_index = None
+        self.lean = self.leaning = 0.0
         if not flattened and len(vertex_of):
             normals = _corner_normals(mesh)
             normals[~np.isfinite(normals).all(axis=1)] = 0.0
+            self.lean, self.leaning = _lean(mesh, normals)
             np.rint(np.multiply(normals, 1e5, out=normals), out=normals)
             keys = normals[:, 0].astype(np.int64)
             for i in (1, 2):
