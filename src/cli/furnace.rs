@@ -7,8 +7,9 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use serde_json::json;
-use smithwalk::description::{Description, World};
+use smithwalk::description::{Description, Estimator, World};
 
+use super::render::EstimatorName;
 use super::scene::SceneArgs;
 
 #[derive(clap::Args)]
@@ -24,6 +25,9 @@ pub struct Args {
     /// Samples per pixel of the rendered part
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..))]
     spp: u32,
+    /// How multiple scattering is computed [default: auto, or the scene's]
+    #[arg(long)]
+    estimator: Option<EstimatorName>,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -48,8 +52,9 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         };
         return scene(args, &source, out, log);
     }
-    let table = table::measure(args.samples, args.seed)?;
-    let rendered = rendered::measure(args.spp, args.seed)?;
+    let estimator = args.estimator.map_or(Estimator::Auto, Into::into);
+    let table = table::measure(estimator, args.samples, args.seed)?;
+    let rendered = rendered::measure(estimator, args.spp, args.seed)?;
     let within = |mean: f64, se: f64| (mean - 1.0).abs() <= SIGMAS * se + ROUNDING;
     let passed = table
         .iter()
@@ -91,6 +96,9 @@ fn scene(
 ) -> anyhow::Result<ExitCode> {
     let mut description: Description = source.describe()?;
     description.lights.clear();
+    if let Some(estimator) = args.estimator {
+        description.sampling.estimator = estimator.into();
+    }
     description.world = Some(World::Constant {
         color: [1.0; 3],
         strength: 1.0,

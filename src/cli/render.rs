@@ -81,7 +81,7 @@ pub struct Args {
 pub enum EstimatorName {
     /// The best one for each material
     Auto,
-    /// One random walk per evaluation: the reference
+    /// One random walk per evaluation, as in the paper; rare large estimates
     Walk,
     /// Two walks, from both directions
     TwoWalk,

@@ -6,7 +6,7 @@ use std::io::Write;
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use smithwalk::description::Description;
+use smithwalk::description::{Description, Estimator};
 use smithwalk::film::{Aov, PixelFilter};
 use smithwalk::integrator::{Control, render};
 use smithwalk::memory::Budget;
@@ -120,7 +120,7 @@ fn materials() -> impl Iterator<Item = (&'static str, &'static str, [f32; 2])> {
 
 /// White shapes in a world image of ones, so that light samples, evaluation and
 /// their combination with walks all take part.
-pub fn measure(spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
+pub fn measure(estimator: Estimator, spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (kind, distribution, alpha) in materials() {
         for (shape, mesh) in SHAPES {
@@ -135,7 +135,8 @@ pub fn measure(spp: u32, seed: u64) -> anyhow::Result<Vec<Row>> {
                  objects: [{{mesh: shape, material: white}}]\n",
                 white(kind, distribution, alpha)
             );
-            let description = Description::from_str(&text, "furnace", &[])?;
+            let mut description = Description::from_str(&text, "furnace", &[])?;
+            description.sampling.estimator = estimator;
             let assets = Assets {
                 meshes: BTreeMap::from([("shape".to_owned(), mesh())]),
                 environment: Some(EnvironmentImage {

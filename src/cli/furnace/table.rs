@@ -44,6 +44,11 @@ pub struct Row {
     /// The same by evaluation and sampling combined, as the renderer does it.
     pub combined: f64,
     pub combined_se: f64,
+    /// The largest single one of the combined estimates.
+    largest: f64,
+    /// Fourth central moment of the combined estimates over the square of the second;
+    /// normal numbers have 3.
+    kurtosis: f64,
 }
 
 impl Row {
@@ -53,11 +58,12 @@ impl Row {
             "alpha_x": self.alpha[0], "alpha_y": self.alpha[1], "cos": self.cos,
             "sampled": self.sampled, "sampled_se": self.sampled_se,
             "combined": self.combined, "combined_se": self.combined_se,
+            "largest": self.largest, "kurtosis": self.kurtosis,
         })
     }
 }
 
-pub fn measure(samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
+pub fn measure(estimator: Estimator, samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
     let mut cases = Vec::new();
     for kind in KINDS {
         for distribution in DISTRIBUTIONS {
@@ -74,29 +80,27 @@ pub fn measure(samples: u64, seed: u64) -> anyhow::Result<Vec<Row>> {
             let stream = seed.wrapping_mul(1 << 20).wrapping_add(index as u64);
             let mut rng = Stream(rand_pcg::Pcg64Mcg::seed_from_u64(stream));
             let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-            let bsdf = compile_alone(&material, Estimator::Auto)?.horizontal(wo);
-            let (sampled, combined) = albedos(&bsdf, wo, samples, &mut rng);
+            let bsdf = compile_alone(&material, estimator)?.horizontal(wo);
+            let [sampled, combined] = albedos(&bsdf, wo, samples, &mut rng);
+            let n = samples as f64;
             Ok(Row {
                 kind,
                 distribution,
                 alpha,
                 cos,
-                sampled: sampled.0,
-                sampled_se: sampled.1,
-                combined: combined.0,
-                combined_se: combined.1,
+                sampled: sampled.mean(n),
+                sampled_se: sampled.standard_error(n),
+                combined: combined.mean(n),
+                combined_se: combined.standard_error(n),
+                largest: combined.largest,
+                kurtosis: combined.kurtosis(n),
             })
         })
         .collect()
 }
 
-/// Mean and standard error of both estimates.
-fn albedos(
-    bsdf: &Bsdf,
-    wo: Vec3,
-    samples: u64,
-    rng: &mut impl Draw<f32>,
-) -> ((f64, f64), (f64, f64)) {
+/// Both estimates: sampled, and combined.
+fn albedos(bsdf: &Bsdf, wo: Vec3, samples: u64, rng: &mut impl Draw<f32>) -> [Sums; 2] {
     let mut sampled = Sums::default();
     let mut combined = Sums::default();
     for _ in 0..samples {
@@ -113,7 +117,7 @@ fn albedos(
         both += value / (bsdf.pdf(wo, wi) + cosine_pdf(wi)).max(f32::MIN_POSITIVE);
         combined.add(both);
     }
-    (sampled.mean(samples), combined.mean(samples))
+    [sampled, combined]
 }
 
 /// Cosine lobes on both sides, |cosθ|/2π.
@@ -128,47 +132,72 @@ fn cosine_pdf(wi: Vec3) -> f32 {
     wi.z.abs() * FRAC_1_PI / 2.0
 }
 
+/// Sums of the powers of estimates less 1, which white ones scatter about.
 #[derive(Default)]
 struct Sums {
-    sum: f64,
-    squares: f64,
+    powers: [f64; 4],
+    largest: f64,
 }
 
 impl Sums {
     fn add(&mut self, value: f32) {
         let value = f64::from(value);
-        self.sum += value;
-        self.squares += value * value;
+        let mut power = 1.0;
+        for sum in &mut self.powers {
+            power *= value - 1.0;
+            *sum += power;
+        }
+        self.largest = self.largest.max(value);
     }
 
-    fn mean(&self, n: u64) -> (f64, f64) {
-        let n = n as f64;
-        let mean = self.sum / n;
-        (
-            mean,
-            ((self.squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt(),
-        )
+    fn mean(&self, n: f64) -> f64 {
+        1.0 + self.powers[0] / n
+    }
+
+    fn variance(&self, n: f64) -> f64 {
+        let [first, second, ..] = self.powers.map(|sum| sum / n);
+        (second - first * first).max(0.0)
+    }
+
+    fn standard_error(&self, n: f64) -> f64 {
+        (self.variance(n) / (n - 1.0)).sqrt()
+    }
+
+    fn kurtosis(&self, n: f64) -> f64 {
+        let [m, second, third, fourth] = self.powers.map(|sum| sum / n);
+        let central = fourth - 4.0 * m * third + 6.0 * m * m * second - 3.0 * m.powi(4);
+        central / self.variance(n).powi(2).max(f64::MIN_POSITIVE)
     }
 }
 
 pub fn write(rows: &[Row], out: &mut dyn Write) -> anyhow::Result<()> {
     writeln!(
         out,
-        "{:<14} {:<9} {:>5} {:>5} {:>6}   {:>22}   {:>22}",
-        "material", "normals", "α_x", "α_y", "cosθ", "walks", "walks and evaluation"
+        "{:<14} {:<9} {:>5} {:>5} {:>6}   {:>22}   {:>22}   {:>9} {:>9}",
+        "material",
+        "normals",
+        "α_x",
+        "α_y",
+        "cosθ",
+        "walks",
+        "walks and evaluation",
+        "largest",
+        "kurtosis"
     )?;
     for row in rows {
         let [x, y] = row.alpha;
         writeln!(
             out,
-            "{:<14} {:<9} {x:>5} {y:>5} {:>6}   {:>10.6} ± {:>9.6}   {:>10.6} ± {:>9.6}",
+            "{:<14} {:<9} {x:>5} {y:>5} {:>6}   {:>10.6} ± {:>9.6}   {:>10.6} ± {:>9.6}   {:>9.2} {:>9.1}",
             row.kind,
             row.distribution,
             row.cos,
             row.sampled,
             row.sampled_se,
             row.combined,
-            row.combined_se
+            row.combined_se,
+            row.largest,
+            row.kurtosis
         )?;
     }
     Ok(())
