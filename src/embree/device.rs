@@ -88,16 +88,23 @@ unsafe impl Send for Device {}
 // SAFETY: as above.
 unsafe impl Sync for Device {}
 
-/// The instructions that Embree is held to. It has code of its own for each
-/// family, and hits differ in their last bits; all x86 processors since 2013 to
-/// 2015 have these.
-fn instructions() -> &'static str {
+/// The family of instructions that Embree's code is of on this processor. It has code
+/// of its own for each, and hits differ in their last bits; so it is held to AVX2, which
+/// all x86 processors since 2013 to 2015 have.
+#[must_use]
+pub fn instructions() -> &'static str {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        return ",isa=avx2";
+    {
+        if std::arch::is_x86_feature_detected!("avx2") {
+            return AVX2;
+        } else if std::arch::is_x86_feature_detected!("avx") {
+            return "AVX";
+        }
     }
-    ""
+    std::env::consts::ARCH
 }
+
+const AVX2: &str = "AVX2";
 
 impl Device {
     /// Opens a device that builds with at most `threads` threads (0: all).
@@ -113,7 +120,12 @@ impl Device {
     /// # Errors
     /// As [`Device::new`].
     pub fn with_limit(threads: usize, limit: u64) -> Result<Self, EmbreeError> {
-        let config = format!("threads={threads}{}", instructions());
+        let held = if instructions() == AVX2 {
+            ",isa=avx2"
+        } else {
+            ""
+        };
+        let config = format!("threads={threads}{held}");
         let config = CString::new(config).expect("digits and letters alone");
         // SAFETY: the string ends with a NUL and outlives the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };

@@ -8,6 +8,7 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 use super::load::Assets;
 use crate::description::{Description, Film, Object, Sampling, Texture, World};
+use crate::embree;
 use crate::film::Identity;
 use crate::mesh::Mesh as Triangles;
 
@@ -59,7 +60,7 @@ pub(super) fn identity(
         identity.insert(name, value);
     };
     add("program".into(), env!("CARGO_PKG_VERSION").into());
-    add("processor".into(), processor().into());
+    add("processor".into(), processor());
     add("camera".into(), of_value(camera));
     add("resolution".into(), format!("{width} × {height}"));
     add("filter".into(), of_value(filter));
@@ -180,17 +181,13 @@ fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
     )
 }
 
-/// The instructions that Embree chooses its code by, which differ in their last bits.
-fn processor() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-            return "AVX-512";
-        } else if is_x86_feature_detected!("avx2") {
-            return "AVX2";
-        } else if is_x86_feature_detected!("avx") {
-            return "AVX";
-        }
-    }
-    std::env::consts::ARCH
+/// What decides about the last bits: Embree's instructions, and whether this program
+/// was built to multiply and add in one step.
+fn processor() -> String {
+    let fused = if cfg!(target_feature = "fma") {
+        ", FMA"
+    } else {
+        ""
+    };
+    format!("{}{fused}", embree::instructions())
 }
