@@ -8,11 +8,14 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 usage() {
     cat <<'END'
 usage: ./setup.sh [--with-lints] [--with-python] [--with-blender]
+                  [--with-denoiser]
 
   --with-lints     also cargo fmt and cargo clippy
   --with-python    also what builds and tests the Python package
   --with-blender   also the distribution's Blender, for reference renders and
                    the tests of the exporter
+  --with-denoiser  also Open Image Denoise, for `smithwalk render --denoise`
+                   (x86-64; 84 MB to fetch, 56 MB to keep)
 
 EMBREE_DIR names an Embree 4.3 or newer to use instead of the distribution's.
 END
@@ -24,13 +27,18 @@ EMBREE=4.3
 WHEEL=embreex==4.4.0.post1
 WHEEL_SHA256=2cd0f7d5c6342e6247e31f700761689cae7829454d8c6de0c41e62124a023e1f
 PRIVATE=.deps/embree
+# The denoiser's library, of which no distribution packages this version.
+OIDN_WHEEL=pyoidn==2.5.1.0
+OIDN_SHA256=32ad13368f8de1ef63001942ad05b02a00cd732d1206d97f352d3a3f606d823e
+OIDN=.deps/oidn
 
-lints=false python=false blender=false
+lints=false python=false blender=false denoiser=false
 for option in "$@"; do
     case $option in
         --with-lints) lints=true ;;
         --with-python) python=true ;;
         --with-blender) blender=true ;;
+        --with-denoiser) denoiser=true ;;
         -h | --help) usage && exit 0 ;;
         *) usage >&2 && exit 2 ;;
     esac
@@ -94,7 +102,16 @@ if $lints && ! $need_cargo && ! { cargo fmt --version && cargo clippy --version;
     has rustup && die "cargo fmt or cargo clippy is missing: rustup component add rustfmt clippy"
     packages+=(rustfmt rust-clippy)
 fi
-if [[ ${#packages[@]} -eq 0 ]] && ! $need_cargo && ! $need_embree; then
+if $denoiser; then
+    if [[ -e $OIDN/lib/libOpenImageDenoise.so.2 ]]; then
+        denoiser=false
+    elif [[ $(uname -m) != x86_64 ]]; then
+        die "Open Image Denoise is fetched for x86-64 alone: set OIDN_DIR to a folder that holds version 2"
+    elif ! python3 -m pip --version >/dev/null 2>&1; then
+        packages+=(python3-pip)
+    fi
+fi
+if [[ ${#packages[@]} -eq 0 ]] && ! $need_cargo && ! $need_embree && ! $denoiser; then
     exit 0
 fi
 
@@ -163,18 +180,22 @@ if [[ ${#packages[@]} -gt 0 ]]; then
     }
 fi
 
-if $need_wheel; then
-    say "fetching Embree from the wheel $WHEEL"
+# A wheel to .deps/new. The Python named here only picks the wheel; nothing of it is run.
+fetch() {
     rm -rf .deps/new
     mkdir -p .deps/new
-    printf '%s --hash=sha256:%s\n' "$WHEEL" "$WHEEL_SHA256" >.deps/new/requirements.txt
-    # The Python named here only picks the wheel; nothing of it is run.
+    printf '%s --hash=sha256:%s\n' "$1" "$2" >.deps/new/requirements.txt
     python3 -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: \
-        --implementation cp --python-version 3.11 --platform manylinux_2_28_x86_64 \
+        --implementation cp --python-version 3.11 --platform manylinux_2_28_x86_64 --platform manylinux2014_x86_64 \
         --require-hashes --requirement .deps/new/requirements.txt --dest .deps/new >"$log" 2>&1 || {
         cat "$log" >&2
-        die "pip could not download $WHEEL, see above"
+        die "pip could not download $1, see above"
     }
+}
+
+if $need_wheel; then
+    say "fetching Embree from the wheel $WHEEL"
+    fetch "$WHEEL" "$WHEEL_SHA256"
     python3 - <<'END'
 import ctypes, pathlib, zipfile
 
@@ -193,6 +214,30 @@ END
     rm -rf $PRIVATE
     mkdir -p $PRIVATE
     mv .deps/new/lib $PRIVATE/lib
+fi
+
+if $denoiser; then
+    say "fetching Open Image Denoise from the wheel $OIDN_WHEEL"
+    fetch "$OIDN_WHEEL" "$OIDN_SHA256"
+    python3 - <<'END'
+import ctypes, pathlib, zipfile
+
+new = pathlib.Path(".deps/new")
+(wheel,) = new.glob("*.whl")
+(new / "lib").mkdir()
+wanted = {"libOpenImageDenoise.so.2", "libOpenImageDenoise_core.so.2.5.1",
+          "libOpenImageDenoise_device_cpu.so.2.5.1", "libtbb.so.12"}
+with zipfile.ZipFile(wheel) as archive:
+    for name in archive.namelist():
+        file = pathlib.Path(name).name
+        if file in wanted:
+            (new / "lib" / file).write_bytes(archive.read(name))
+wheel.unlink()
+ctypes.CDLL(str((new / "lib" / "libOpenImageDenoise.so.2").resolve()))
+END
+    rm -rf $OIDN
+    mkdir -p $OIDN
+    mv .deps/new/lib $OIDN/lib
 fi
 
 if $need_cargo; then

@@ -30,7 +30,7 @@ python_package() {
 }
 python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
 
-stage set-up ./setup.sh --with-lints --with-python --with-blender
+stage set-up ./setup.sh --with-lints --with-python --with-blender --with-denoiser
 [[ ${#failed[@]} -eq 0 ]] || exit 1
 stage shell shell_syntax
 stage python python_syntax

@@ -9,6 +9,7 @@ mod cli;
 mod common;
 mod converge;
 mod cycles;
+mod denoise;
 mod description;
 mod description_files;
 mod diff;

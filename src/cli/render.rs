@@ -13,9 +13,10 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use smithwalk::description::{Description, Estimator};
+use smithwalk::embree::Denoiser;
 use smithwalk::features::Features;
-use smithwalk::film::{Film, Identity, SavedFilm};
-use smithwalk::image::Window;
+use smithwalk::film::{Aov, Film, Identity, SavedFilm};
+use smithwalk::image::{DENOISED, Image, Layer, OutputPath, Window};
 use smithwalk::integrator::{Checkpoint, Control, RenderReport, Stop, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene};
 use xxhash_rust::xxh3::xxh3_128;
@@ -65,6 +66,9 @@ pub struct Args {
     /// Render these frames of an animation, both ends included; a row of # in OUT stands for the number
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     frames: Option<FrameRange>,
+    /// Also write the image without noise, as OUT.denoised.exr and a layer of OUT.exr, by Open Image Denoise
+    #[arg(long, conflicts_with = "part")]
+    denoise: bool,
     /// How progress is told on stderr
     #[arg(long, value_name = "KIND", default_value = "bar")]
     progress: ProgressKind,
@@ -273,6 +277,9 @@ impl Shot<'_> {
             ..
         } = resolved;
         let settings = override_settings(args, settings.clone())?;
+        let threads = args.threads.map_or(0, usize::from);
+        let denoiser = args.denoise.then(|| Denoiser::open(threads));
+        let denoiser = denoiser.transpose()?;
         let mut film = settings.film();
         if args.resume && outputs.film.exists() {
             film.resume(SavedFilm::read(&outputs.film)?, identity)
@@ -315,11 +322,27 @@ impl Shot<'_> {
             let mark = complete_mark(identity, description, &settings);
             image.attributes.push((COMPLETE.to_owned(), mark));
         }
-        for output in &outputs.images {
-            // One that fails must not keep the others from being written.
-            if let Err(error) = output.write(&image, settings.exposure) {
-                failed = Some(error.into());
+        // One that fails must not keep the others from being written.
+        let mut write = |outputs: &[OutputPath], image: &Image| {
+            for output in outputs {
+                if let Err(error) = output.write(image, settings.exposure) {
+                    failed = Some(error.into());
+                }
             }
+        };
+        let denoised = denoiser.map(|denoiser| image.denoised(&denoiser));
+        if let Some(Ok(color)) = &denoised {
+            image.layers.push(Layer::of_color(DENOISED, color));
+        }
+        write(&outputs.images, &image);
+        match denoised {
+            Some(Ok(color)) => {
+                image.color = color;
+                image.layers.clear();
+                write(&outputs.denoised, &image);
+            }
+            Some(Err(error)) => failed = Some(error.into()),
+            None => {}
         }
         if let Some(error) = failed {
             let rescued = outputs.rescue(&film, identity, target);
@@ -366,6 +389,13 @@ fn apply(args: &Args, description: &mut Description) {
     }
     if let Some(estimator) = args.estimator {
         description.sampling.estimator = estimator.into();
+    }
+    if args.denoise {
+        for guide in [Aov::Albedo, Aov::Normal] {
+            if !description.film.aovs.contains(&guide) {
+                description.film.aovs.push(guide);
+            }
+        }
     }
 }
 

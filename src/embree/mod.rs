@@ -1,4 +1,5 @@
-//! Intel Embree 4 behind a safe interface: the only unsafe code of the crate.
+//! Intel Embree 4 behind a safe interface, and Open Image Denoise: the only unsafe code
+//! of the crate.
 //!
 //! A [`Device`] opens the library, [`Accelerator`] is a committed two-level
 //! scene of triangle meshes and instances that answers [`Accelerator::intersect`]
@@ -10,12 +11,14 @@
 #![allow(unsafe_code)]
 
 mod device;
+mod oidn;
 mod ray;
 #[cfg(feature = "record-rays")]
 mod record;
 mod scene;
 
-pub use device::{Device, EmbreeError};
+pub use device::{Device, EmbreeError, instructions};
+pub use oidn::{DenoiseError, Denoiser, Guides};
 pub use ray::{Hit, Ray};
 #[cfg(feature = "record-rays")]
 pub use record::{Query, recorded};

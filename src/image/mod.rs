@@ -2,11 +2,13 @@
 //!
 //! [`OutputPath`] writes an [`Image`] as EXR or PNG, [`read_exr`] reads one back.
 
+mod denoise;
 mod exr;
 mod output;
 pub(crate) mod planes;
 mod window;
 
+pub use denoise::DENOISED;
 pub use exr::{ExrError, read_exr};
 pub use output::{OutputError, OutputPath, check_output, replace};
 pub use window::Window;
@@ -120,9 +122,14 @@ impl Layer {
 
     /// Red, green and blue per pixel, if those channels are there.
     pub fn rgb(&self) -> Option<Vec<[f32; 3]>> {
-        let [r, g, b] = ["R", "G", "B"].map(|name| self.channel(name));
-        let (r, g, b) = (r?, g?, b?);
-        Some((0..r.len()).map(|i| [r[i], g[i], b[i]]).collect())
+        self.triples(["R", "G", "B"])
+    }
+
+    /// These three channels per pixel, if they are there.
+    pub fn triples(&self, channels: [&str; 3]) -> Option<Vec<[f32; 3]>> {
+        let [a, b, c] = channels.map(|name| self.channel(name));
+        let (a, b, c) = (a?, b?, c?);
+        Some((0..a.len()).map(|i| [a[i], b[i], c[i]]).collect())
     }
 }
 

@@ -13,6 +13,8 @@ use super::{Args, COMPLETE};
 pub struct Outputs {
     /// The images, each checked beforehand so that no finished render is lost.
     pub images: Vec<OutputPath>,
+    /// The same without noise, if asked for.
+    pub denoised: Vec<OutputPath>,
     /// The film: checkpoints, and where an interrupted render goes on from.
     pub film: PathBuf,
     /// Whether it stays when the render is complete.
@@ -56,7 +58,17 @@ impl Outputs {
         );
         let images = images.into_iter().map(OutputPath::new);
         let images = images.collect::<Result<Vec<_>, _>>()?;
-        for image in &images {
+        let without_noise = |image: &OutputPath| {
+            let kind = image.path().extension().unwrap_or_default();
+            let kind = Path::new("denoised").with_extension(kind);
+            OutputPath::new(image.path().with_extension(kind))
+        };
+        let denoised = if args.denoise {
+            images.iter().map(without_noise).collect::<Result<_, _>>()?
+        } else {
+            Vec::new()
+        };
+        for image in images.iter().chain(&denoised) {
             image.check()?;
         }
         let named = films.into_iter().next();
@@ -69,7 +81,12 @@ impl Outputs {
             (None, None) => unreachable!("there is an output"),
         };
         check_output(&film)?;
-        Ok(Self { images, film, keep })
+        Ok(Self {
+            images,
+            denoised,
+            film,
+            keep,
+        })
     }
 
     /// Whether all images are there, and one of them says that it is complete by this
@@ -82,7 +99,7 @@ impl Outputs {
         };
         !self.keep
             && !self.film.exists()
-            && self.images.iter().all(|output| output.path().exists())
+            && self.all_images().all(|output| output.path().exists())
             && self.images.iter().any(says_so)
     }
 
@@ -121,7 +138,11 @@ impl Outputs {
     /// What there is now.
     pub fn written(&self, interrupted: bool) -> impl Iterator<Item = &Path> {
         let film = self.stays(interrupted).then_some(self.film.as_path());
-        self.images.iter().map(OutputPath::path).chain(film)
+        self.all_images().map(OutputPath::path).chain(film)
+    }
+
+    fn all_images(&self) -> impl Iterator<Item = &OutputPath> {
+        self.images.iter().chain(&self.denoised)
     }
 }
 
