@@ -1,7 +1,7 @@
 //! Surfaces made of layers.
 
 use super::material::{Factor, Material, MaterialRef};
-use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness};
+use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
 use serde::Deserialize;
