@@ -91,6 +91,14 @@ const PLAINER: &[&[(&str, &str)]] = &[
     &[("sampling.estimator", "single")],
     &[("materials.gold", BECKMANN)],
     &[("materials.gold", BECKMANN), ("sampling.branches", "1")],
+    &[(
+        "materials.gold",
+        "{principled: {version: 5.0, roughness: 0.3, coat_weight: 0.5}}",
+    )],
+    &[(
+        "materials.gold",
+        "{openpbr: {coat_weight: 0.5, fuzz_weight: 0.5}}",
+    )],
 ];
 
 const BECKMANN: &str = "{conductor: {alpha: 0.5, distribution: beckmann}}";

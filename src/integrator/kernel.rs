@@ -45,6 +45,18 @@ const STUDIO: Features = GLASS
     .with(Features::MIXES)
     .with(Features::EMISSIVE_MESHES)
     .with(Features::DEPTH_OF_FIELD);
+/// Opaque surfaces of Blender's node under anything that shines.
+const NODES: Features = ROOM
+    .without(Features::DIFFUSE_FACETS)
+    .with(Features::TEXTURES)
+    .with(Features::ENVIRONMENT)
+    .with(Features::EMISSIVE_MESHES)
+    .with(Features::DEPTH_OF_FIELD)
+    .with(Features::MIXES)
+    .with(Features::DIFFUSERS)
+    .with(Features::PRINCIPLED);
+/// The same by walks, and other stacks that nothing gets through.
+const STACKS: Features = NODES.with(Features::LAYERS);
 const EVERYTHING: Features = Features::EVERYTHING;
 
 impl<const F: u32> Integrator for PathTracer<'_, F> {
@@ -88,7 +100,7 @@ impl Kernel {
 
 /// Every kernel there is, from the leanest to the one with everything.
 pub const KERNELS: &[Features] = &[
-    PLAIN, LIT, METAL, FURNACE, ROOM, GLASS, TEXTURED, STUDIO, EVERYTHING,
+    PLAIN, LIT, METAL, FURNACE, ROOM, GLASS, TEXTURED, STUDIO, NODES, STACKS, EVERYTHING,
 ];
 
 /// The same list as code; the test below holds the two together.
@@ -101,6 +113,8 @@ const CODE: &[Kernel] = &[
     Kernel::new::<{ GLASS.bits() }>(),
     Kernel::new::<{ TEXTURED.bits() }>(),
     Kernel::new::<{ STUDIO.bits() }>(),
+    Kernel::new::<{ NODES.bits() }>(),
+    Kernel::new::<{ STACKS.bits() }>(),
     Kernel::new::<{ EVERYTHING.bits() }>(),
 ];
 
