@@ -148,7 +148,7 @@ def main():
     section.replace("Albedos", f"Of {args.samples} walks each; standard errors are below 0.001. \"Off\" is against the "
                     f"walks.\n\n{albedos(command, cycles, args.samples)}", PAGE, TITLE)
     section.replace("Lobes", "f·cosθ towards the viewer at 45°, with light from four directions.\n\n"
-                    + lobes(command, 20 * args.samples), PAGE, TITLE)
+                    + lobes(command, 2 * args.samples), PAGE, TITLE)
     section.replace("Cost", f"The sphere of `scenes/gold_sphere` at {args.spp} samples per pixel; relMSE is that of the "
                     f"noise, half of what two seeds differ by.\n\n{cost(command, args.spp)}", PAGE, TITLE)
 
