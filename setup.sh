@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 usage() {
     cat <<'END'
 usage: ./setup.sh [--with-lints] [--with-python] [--with-blender]
-                  [--with-denoiser]
+                  [--with-denoiser] [--with-slurm]
 
   --with-lints     also cargo fmt and cargo clippy
   --with-python    also what builds and tests the Python package
@@ -16,6 +16,7 @@ usage: ./setup.sh [--with-lints] [--with-python] [--with-blender]
                    the tests of the exporter
   --with-denoiser  also Open Image Denoise, for `smithwalk render --denoise`
                    (x86-64; 84 MB to fetch, 56 MB to keep)
+  --with-slurm     also Slurm, whose daemons the test of farm/slurm starts
 
 EMBREE_DIR names an Embree 4.3 or newer to use instead of the distribution's.
 END
@@ -32,13 +33,14 @@ OIDN_WHEEL=pyoidn==2.5.1.0
 OIDN_SHA256=32ad13368f8de1ef63001942ad05b02a00cd732d1206d97f352d3a3f606d823e
 OIDN=.deps/oidn
 
-lints=false python=false blender=false denoiser=false
+lints=false python=false blender=false denoiser=false slurm=false
 for option in "$@"; do
     case $option in
         --with-lints) lints=true ;;
         --with-python) python=true ;;
         --with-blender) blender=true ;;
         --with-denoiser) denoiser=true ;;
+        --with-slurm) slurm=true ;;
         -h | --help) usage && exit 0 ;;
         *) usage >&2 && exit 2 ;;
     esac
@@ -97,6 +99,9 @@ if $blender; then
     has blender || packages+=(blender)
     # For the distribution's Blender, which runs the distribution's Python.
     /usr/bin/python3 -c 'import numpy' 2>/dev/null || packages+=(python3-numpy)
+fi
+if $slurm; then
+    has slurmctld || packages+=(slurmctld slurmd slurm-client munge)
 fi
 if $lints && ! $need_cargo && ! { cargo fmt --version && cargo clippy --version; } >/dev/null 2>&1; then
     has rustup && die "cargo fmt or cargo clippy is missing: rustup component add rustfmt clippy"

@@ -28,9 +28,11 @@ python_package() {
         $venv/bin/pip install -q --force-reinstall --no-deps $venv/wheel/*.whl &&
         $venv/bin/python -m pytest -q python/tests
 }
+# Skips itself where its daemons can't be started.
+slurm() { tests/slurm.sh target/debug/smithwalk || [[ $? -eq 77 ]]; }
 python_syntax() { scripts -name '*.py' | PYTHONPYCACHEPREFIX=target/pycache xargs -0 python3 -m py_compile; }
 
-stage set-up ./setup.sh --with-lints --with-python --with-blender --with-denoiser
+stage set-up ./setup.sh --with-lints --with-python --with-blender --with-denoiser --with-slurm
 [[ ${#failed[@]} -eq 0 ]] || exit 1
 stage shell shell_syntax
 stage python python_syntax
@@ -40,6 +42,7 @@ stage documentation documentation
 stage tests tests
 stage python-package python_package
 stage extending tests/extending.sh
+stage slurm slurm
 
 printf '\n== summary\n'
 grep '^test result:' "$results"

@@ -23,10 +23,10 @@ fn succeeds(args: &[&str]) -> Output {
 
 /// A scene of its own in a folder of its own: a metal with a texture on a mesh under a
 /// lamp and an image of the surroundings.
-struct Room(PathBuf);
+pub struct Room(pub PathBuf);
 
 impl Room {
-    fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("films-{name}"));
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).unwrap();
@@ -38,11 +38,11 @@ impl Room {
         room
     }
 
-    fn file(&self, name: &str) -> String {
+    pub fn file(&self, name: &str) -> String {
         self.0.join(name).to_str().expect("UTF-8").to_owned()
     }
 
-    fn write(&self, name: &str, text: &str) {
+    pub fn write(&self, name: &str, text: &str) {
         std::fs::write(self.file(name), text).unwrap();
     }
 
@@ -75,7 +75,7 @@ impl Room {
             .unwrap();
     }
 
-    fn image(&self, name: &str) -> Image {
+    pub fn image(&self, name: &str) -> Image {
         read_exr(Path::new(&self.file(name))).unwrap()
     }
 
@@ -86,14 +86,14 @@ impl Room {
         all
     }
 
-    fn command(&self, more: &[&str]) -> Command {
+    pub fn command(&self, more: &[&str]) -> Command {
         let arguments = self.arguments(more);
         let mut command = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         command.current_dir(&self.0);
         command
     }
 
-    fn render(&self, more: &[&str]) -> Output {
+    pub fn render(&self, more: &[&str]) -> Output {
         let output = self.command(more).output().expect("the program starts");
         let log = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{more:?}: {log}");
@@ -231,56 +231,6 @@ fn resume_refuses_what_changes_samples_and_nothing_else() {
     std::fs::write(room.file("a.exr.film"), &other).unwrap();
     let (goes_on, log) = room.resume(&[]);
     assert!(!goes_on && log.contains("another version"), "{log}");
-}
-
-/// Renders long enough to be killed again and again; `kills` moments spread evenly
-/// over the first half second, `signal` as `kill` names it.
-fn killed(name: &str, kills: u32, signal: &str) {
-    let room = Room::new(name);
-    let size = [
-        "-D",
-        "film.width=20",
-        "-D",
-        "film.height=14",
-        "--spp",
-        "256",
-    ];
-    room.render(&[&["-o", "whole.exr"][..], &size].concat());
-    let more = ["-o", "a.exr", "--resume", "--checkpoint", "0.02"];
-    let more = [&more[..], &size].concat();
-    for kill in 0..kills {
-        let mut child = room.command(&more);
-        let mut child = child
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(Duration::from_millis(20 + u64::from(kill * 480 / kills)));
-        let id = child.id().to_string();
-        let sent = Command::new("kill").args([signal, &id]).status().unwrap();
-        assert!(sent.success());
-        child.wait().unwrap();
-    }
-    room.render(&more);
-    assert_eq!(room.image("a.exr").color, room.image("whole.exr").color);
-    let names = std::fs::read_dir(&room.0).unwrap();
-    let left = names.filter(|name| {
-        let name = name.as_ref().unwrap().file_name();
-        name.to_string_lossy().ends_with(".part")
-    });
-    assert_eq!(left.count(), 0, "no leftovers");
-}
-
-#[test]
-fn kills_at_any_moment_change_no_bit() {
-    killed("kills", 8, "-9");
-}
-
-/// `cargo test --test suite -- --ignored a_hundred_kills`
-#[test]
-#[ignore = "a minute"]
-fn a_hundred_kills_change_no_bit() {
-    killed("hundred", 100, "-9");
 }
 
 /// SIGTERM loses nothing: image and film are there, and the rest follows with the same

@@ -13,6 +13,7 @@ mod denoise;
 mod description;
 mod description_files;
 mod diff;
+mod endurance;
 mod explicit_stack;
 mod extreme_scenes;
 mod extremes;

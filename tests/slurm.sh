@@ -7,15 +7,15 @@
 # Exit code 77: skipped, for want of Slurm or of the rights to start it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-smithwalk=$(realpath "${1:-target/release/smithwalk}")
+smithwalk=$(realpath "${1:-target/debug/smithwalk}")
 
 skip() { printf 'slurm: skipped: %s\n' "$*" && exit 77; }
 fail() { printf 'slurm: %s\n' "$*" >&2 && exit 1; }
 [[ $(id -u) -eq 0 ]] || skip 'the daemons need root'
 for program in slurmctld slurmd sbatch munged; do
-    command -v $program > /dev/null || skip "there is no $program (apt-get install slurmctld slurmd slurm-client munge)"
+    command -v $program > /dev/null || skip "there is no $program; ./setup.sh --with-slurm installs it"
 done
-[[ -x $smithwalk ]] || fail "there is no $smithwalk: cargo build --release"
+[[ -x $smithwalk ]] || fail "there is no $smithwalk: cargo build"
 
 place=$PWD/target/slurm
 rm -rf "$place"
@@ -74,11 +74,12 @@ cat > "$films/scene.yaml" <<'END'
 smithwalk: 1
 frames: moves/#.yaml
 camera: {projection: {perspective: {fov: 40}}, transform: {look_at: {from: [0, -4, 2], to: [0, 0, 0]}}}
-film: {width: 80, height: 60}
+film: {width: 40, height: 30}
+sampling: {branches: 1}
 world: {constant: {color: 0.2}}
-materials: {gold: {conductor: {metal: gold, roughness: 0.8}}}
+materials: {grey: {diffuse: {color: 0.5}}}
 meshes: {floor: {file: floor.obj}}
-objects: [{mesh: floor, material: gold}]
+objects: [{mesh: floor, material: grey}]
 lights: [{point: {power: 100, radius: 0.1, transform: {location: [0, 0, 2]}}}]
 END
 printf 'v -2 -2 0\nv 2 -2 0\nv 2 2 1\nv -2 2 1\nf 1 2 3 4\n' > "$films/floor.obj"
@@ -86,7 +87,7 @@ mkdir "$films/moves"
 for frame in 3 4; do
     printf 'lights.0.point.transform: {location: [%s, 0, 2]}\n' $((frame - 3)) > "$films/moves/$frame.yaml"
 done
-spp=${SPP:-6000}
+spp=${SPP:-12000}
 
 work=$(farm/slurm/submit "$films/scene.yaml" "$films/out_##.exr" --frames 3..4 --parts 2 --spp "$spp" \
     --at-once 2 --smithwalk "$smithwalk" -- --cpus-per-task=1)
@@ -113,7 +114,7 @@ scontrol requeue "${job}_1"
 farm/slurm/status "$work"
 
 # Requeued tasks wait for two minutes, which is not what is tested.
-for ((second = 0; second < 150; second++)); do
+for ((second = 0; second < 400; second++)); do
     waiting=$(squeue --noheader --array --states=PENDING --jobs="$job" --format='%i %r' 2> /dev/null | awk '$2 == "BeginTime" { print $1 }')
     for task in $waiting; do
         scontrol update JobId="$task" StartTime=now || true

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use anyhow::Context;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
 use signal_hook::flag;
 
 /// What has been asked for by signals.
@@ -36,6 +36,9 @@ impl Signals {
             flag::register(signal, Arc::clone(&self.interrupt))?;
         }
         flag::register(SIGUSR1, Arc::clone(&self.save))?;
+        // Whoever is listened for does not end the program: a file beyond the limit of
+        // sizes is then refused like one on a full disk.
+        flag::register(SIGXFSZ, Arc::default())?;
         Ok(())
     }
 
