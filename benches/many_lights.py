@@ -23,7 +23,7 @@ SIDE, BOUNCES, POWER = 20.0, 3, 4000.0
 CUBES = [(2.0 * (i % 10) - 9.0, 2.0 * (i // 10) - 9.0) for i in range(100)]
 CORNERS = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
 FACES = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)]
-CUBE, CAMERA, FOV, IMAGE = 0.3, (0.0, -16.0, 9.0), 50.0, (160, 120)
+CUBE, CAMERA, FOV, IMAGE = 0.3, (0.0, -16.0, 9.0), 50.0, (96, 72)
 
 
 def lamps(count):

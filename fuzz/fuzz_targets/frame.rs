@@ -6,7 +6,7 @@ use smithwalk::description::Animation;
 use std::sync::LazyLock;
 
 const SCENE: &str = "smithwalk: 1
-frames: ####.yaml
+frames: moves/####.yaml
 camera: {projection: {perspective: {fov: 40}}}
 world: {constant: {color: 1}}
 textures: {t: {file: t.png}}
