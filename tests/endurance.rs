@@ -50,12 +50,12 @@ struct Killed {
     lost: f64,
 }
 
-/// Renders with a checkpoint every 50 ms, killed and gone on with so many times, at
+/// Renders so many samples with a checkpoint every 50 ms, killed and gone on with so many times, at
 /// moments from 20 ms to `latest` ms after the start; then to its end, which has the bits
 /// of a render that nothing happened to.
-fn killed(name: &str, kills: u32, latest: u32) -> Killed {
+fn killed(name: &str, kills: u32, latest: u32, spp: &str) -> Killed {
     let room = Room::new(name);
-    let spp = ["--spp", "256"];
+    let spp = ["--spp", spp];
     room.render(&[&["-o", "whole.exr"][..], &SIZE, &spp].concat());
     let more = ["-o", "a.exr", "--resume", "--checkpoint", "0.05"];
     let more = [&more[..], &SIZE, &spp].concat();
@@ -90,7 +90,7 @@ fn killed(name: &str, kills: u32, latest: u32) -> Killed {
 
 #[test]
 fn kills_at_any_moment_change_no_bit() {
-    killed("kills", 8, 500);
+    killed("kills", 8, 500, "256");
 }
 
 /// With some of the kills within the writing of a checkpoint.
@@ -98,7 +98,7 @@ fn kills_at_any_moment_change_no_bit() {
 #[test]
 #[ignore = "two minutes"]
 fn a_hundred_kills_change_no_bit() {
-    let found = killed("hundred", 100, 1500);
+    let found = killed("hundred", 100, 1500, "8192");
     println!("{found:?}");
     assert!(found.writing > 0, "{found:?}");
     // An interval, and the second of a loaded machine.

@@ -237,6 +237,35 @@ fn a_film_of_another_render_is_refused_and_the_difference_named() {
     assert!(!refused(&good));
 }
 
+/// Sums can hold squares of single-precision numbers; a mean of colours that is beyond
+/// such numbers is no film's.
+#[test]
+fn sums_that_no_colours_have_are_refused() {
+    let folder = Folder::new("huge");
+    let path = folder.file("a.film");
+    let mut film = Film::new([1, 1], Window::full([1, 1]), AovSet::NONE);
+    for tile in film.tiles_mut() {
+        tile.add([0, 0], &[Sample::of([1.0, 2.0, 3.0])]);
+        tile.advance();
+    }
+    film.save(&path, &Identity::new(), 1).unwrap();
+    let good = std::fs::read(&path).unwrap();
+    // First the bins, of 38 exponents each: 1 is in bin 0.
+    let content = good.len() - 16;
+    let ranges = [1u32, 0, 1].map(u32::to_le_bytes).concat();
+    let mut windows = good.windows(ranges.len());
+    let start = windows.rposition(|w| *w == ranges).unwrap() + ranges.len();
+    for bin in [0u8, 3, 6] {
+        let mut bytes = good.clone();
+        assert_eq!(bytes[start], 0);
+        bytes[start] = bin;
+        let sum = xxhash_rust::xxh3::xxh3_128(&bytes[..content]);
+        bytes[content..].copy_from_slice(&sum.to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        assert_eq!(SavedFilm::read(&path).is_ok(), bin < 6, "{bin}");
+    }
+}
+
 #[test]
 fn unusable_outputs_are_found_beforehand() {
     let folder = Folder::new("outputs");

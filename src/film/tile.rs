@@ -446,7 +446,10 @@ impl FilmTile {
                 .copied()
                 .chain(std::iter::repeat(0)),
         );
+        // Means of single-precision numbers are such numbers.
+        let mut colors = self.window.pixels().flat_map(|pixel| self.color(pixel));
         halves.iter().all(|half| half.is_finite())
+            && colors.all(|color| (color as f32).is_finite())
             && counts
                 .into_iter()
                 .all(|(&left_out, aovs)| left_out.checked_add(aovs).is_some_and(|sum| sum <= count))

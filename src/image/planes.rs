@@ -3,6 +3,7 @@
 use exr::meta::MetaData;
 use exr::prelude::{FlatImage, FlatSamples, IntegerBounds, ReadChannels, ReadLayers, Text};
 use std::io::{BufRead, Seek, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::memory::Bytes;
 
@@ -47,13 +48,20 @@ pub(crate) fn read_flat(
     reader
         .seek(SeekFrom::Start(0))
         .map_err(|error| error.to_string())?;
-    exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(reader)
+    // The decompressors are others' code, and what they run into ends here: in a thread
+    // of a pool it would end the program.
+    let read = || {
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(reader)
+    };
+    catch_unwind(AssertUnwindSafe(read))
+        .map_err(|_| "it is broken: its decoder gave up".to_owned())?
         .map_err(|error| error.to_string())
 }
 
