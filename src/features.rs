@@ -66,6 +66,8 @@ features! {
     ABSORPTION = 22, "absorption", "the media that a path is in, and what they leave of it, per ray";
     /// Facets with the normals of the quadratic distribution.
     QUADRATIC = 23, "quadratic normals", "a third distribution in every rough closure";
+    /// Normals out of textures.
+    NORMAL_MAPS = 24, "normal maps", "tangents in memory, a normal per closure";
 }
 
 impl Features {

@@ -25,6 +25,7 @@ mod inputs;
 mod layers;
 mod light;
 mod parity;
+mod relief;
 mod render;
 mod shading_normals;
 mod tables;

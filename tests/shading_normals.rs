@@ -13,7 +13,7 @@ use smithwalk::embree::Ray;
 use smithwalk::features::Features;
 use smithwalk::memory::Budget;
 use smithwalk::mesh::Mesh;
-use smithwalk::scene::{self, Assets, Surface, View, assemble, compile_alone};
+use smithwalk::scene::{self, Assets, Ground, Surface, View, assemble, compile_alone};
 use smithwalk_model::{Draw, LANES, Stream};
 use wide::f32x8;
 
@@ -55,7 +55,7 @@ fn material(text: &str) -> scene::Material {
 fn leaning(material: &scene::Material, tilt: f32, wo: Vec3) -> Bsdf {
     let normal = Vec3::new(tilt.sin(), 0.0, tilt.cos());
     let surface = Surface::horizontal(true).with_normal(normal);
-    material.bsdf(&[], &surface, View { wo, camera: false })
+    material.bsdf(Ground::default(), &surface, View { wo, camera: false })
 }
 
 fn uniform(rng: &mut Rng) -> Vec3 {

@@ -10,7 +10,7 @@ import math
 
 import bpy
 
-from . import bake, nodes
+from . import bake, nodes, relief
 from .audit import Audit
 from .bake import uniform
 from .log import Log
@@ -221,8 +221,6 @@ class _Surface:
         if output.inputs["Volume"].is_linked:
             surface = self.filled(surface, output.inputs["Volume"])
         for node, what in self.graph.lost():
-            if what == "input Normal (linked)":
-                what = "its normal input (bump or normal map)"
             self.warn(f"{what}: left out", node)
         view = self.writer.audit.view(material)
         view.accept("use_nodes", "displacement_method", "cycles.displacement_method", "preview_render_type")
@@ -370,9 +368,10 @@ class _Surface:
     def rough(self, node, groups):
         """The rough keys of a Glossy, Anisotropic, Metallic or Glass node."""
         keys, sharp = self.distribution(node)
+        keys.update(relief.keys(self, node, groups))
         if sharp:
             self.idle(node, "Roughness", "Anisotropy", "Rotation", "Tangent")
-            return {"alpha": 0.0}
+            return {**keys, "alpha": 0.0}
         keys["roughness"] = self.scalar(node, "Roughness", groups, 0.0, 1.0)
         if "Anisotropy" in node.inputs and node.inputs["Anisotropy"].enabled:
             anisotropy = self.scalar(node, "Anisotropy", groups, -1.0, 1.0)
@@ -390,7 +389,7 @@ class _Surface:
 
     def diffuse(self, node, groups):
         """Diffuse BSDF: Lambert, or Oren and Nayar's."""
-        keys = {"color": self.color(node, "Color", groups)}
+        keys = {"color": self.color(node, "Color", groups), **relief.keys(self, node, groups)}
         roughness = self.scalar(node, "Roughness", groups, 0.0, 1.0)
         if roughness != 0.0:
             keys.update(roughness=roughness, version=DIFFUSE_VERSION)
@@ -441,27 +440,30 @@ class _Surface:
 
     def translucent(self, node, groups):
         """Translucent BSDF."""
-        return {"translucent": {"color": self.color(node, "Color", groups)}}
+        return {"translucent": {"color": self.color(node, "Color", groups), **relief.keys(self, node, groups)}}
 
     def velvet(self, node, groups):
         """Velvet BSDF (3.x)."""
         return {"velvet": {"color": self.color(node, "Color", groups),
-                           "sigma": self.scalar(node, "Sigma", groups, 0.0, 1.0)}}
+                           "sigma": self.scalar(node, "Sigma", groups, 0.0, 1.0),
+                           **relief.keys(self, node, groups)}}
 
     def sheen(self, node, groups):
         """Sheen BSDF (4.0 and newer)."""
         if self.graph.view(node).distribution == "ASHIKHMIN":
             return {"velvet": {"color": self.color(node, "Color", groups),
-                               "sigma": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
+                               "sigma": self.scalar(node, "Roughness", groups, 0.0, 1.0),
+                               **relief.keys(self, node, groups)}}
         return {"sheen": {"color": self.color(node, "Color", groups),
-                          "roughness": self.scalar(node, "Roughness", groups, 0.0, 1.0)}}
+                          "roughness": self.scalar(node, "Roughness", groups, 0.0, 1.0),
+                          **relief.keys(self, node, groups)}}
 
     def subsurface(self, node, groups):
         """Subsurface Scattering: light that comes out where it went in."""
         self.warn("light comes out where it went in: written as diffuse of the same colour", node)
         self.graph.view(node).accept("falloff")
         self.idle(node, "Scale", "Radius", "IOR", "Anisotropy", "Roughness")
-        return {"diffuse": {"color": self.color(node, "Color", groups)}}
+        return {"diffuse": {"color": self.color(node, "Color", groups), **relief.keys(self, node, groups)}}
 
     def holdout(self, node, groups):
         """Holdout: a hole in the picture; black here."""
@@ -551,6 +553,7 @@ class _Surface:
         if any(keys.get(k) for k in ("subsurface", "subsurface_weight")):
             self.warn("subsurface light comes out where it went in", node)
             self.idle(node, *_IDLE["Subsurface"], *_IDLE["Subsurface Weight"])
+        keys.update(relief.keys(self, node, groups))
         keys.setdefault("base_color", 0.8)
         return {"principled": keys}
 

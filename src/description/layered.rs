@@ -1,6 +1,7 @@
 //! Surfaces made of layers.
 
 use super::material::{Factor, Material, MaterialRef};
+use super::relief::NormalMap;
 use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
@@ -21,6 +22,8 @@ pub struct Layered {
     /// Where it comes from.
     #[serde(default)]
     pub tangent: Tangent,
+    /// What replaces the interpolated normal of all layers.
+    pub normal: Option<NormalMap>,
 }
 
 fn none() -> Scalar {
@@ -77,6 +80,9 @@ impl TryFrom<RawInterface> for Interface {
         if raw.scattering == Scattering::Single {
             return Err(Clash::new("scattering", OWN_SCATTERING));
         }
+        if raw.normal.is_some() {
+            return Err(Clash::new("normal", OWN_NORMAL));
+        }
         let rough = raw.rough()?;
         let slab = match (raw.absorption, raw.thickness, raw.transmittance) {
             (None, None, None) => Slab::Clear,
@@ -102,6 +108,7 @@ impl TryFrom<RawInterface> for Interface {
 }
 
 const OWN_TANGENT: &str = "the layers share one tangent: give it to `layered`";
+const OWN_NORMAL: &str = "the layers share one normal: give it to `layered`";
 const OWN_SCATTERING: &str = "layers are by walks, which follow all scattering";
 
 /// What a base may be.
@@ -130,6 +137,7 @@ impl Layered {
             }
         }
         check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
+        check.normal(self.normal.as_ref(), at);
         if let Some(base) = &self.base {
             base.check(check, at.key("base"));
             check_base(base, false, check, at.key("base"));
@@ -177,6 +185,9 @@ fn check_base(base: &MaterialRef, in_mix: bool, check: &mut Check<'_, '_>, at: A
 /// Whether a material, mixed with another or alone, can be the base of a stack; of a
 /// mix its factor alone is looked at.
 pub(crate) fn fits(material: &Material, in_mix: bool) -> Result<(), String> {
+    if material.normal().is_some() {
+        return Err(OWN_NORMAL.to_owned());
+    }
     let rough = match material {
         Material::Conductor(conductor) => &conductor.rough,
         Material::RoughDiffuse(matte) => &matte.rough,

@@ -4,6 +4,7 @@ use super::filled::Filled;
 use super::layered::Layered;
 use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
+use super::relief::NormalMap;
 use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar, visit_numbers};
@@ -27,7 +28,7 @@ pub enum Material {
     /// Lambert's law, or Oren and Nayar's.
     Diffuse(Diffuse),
     /// Lambert's law, to the other side.
-    Translucent(Colored),
+    Translucent(Translucent),
     /// Ashikhmin's velvet.
     Velvet(Velvet),
     /// Fibres on a surface.
@@ -141,6 +142,8 @@ pub struct Diffuse {
     pub roughness: Scalar,
     /// Which of Cycles' formulas is meant for rough ones.
     pub version: Version,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
 }
 
 impl Default for Diffuse {
@@ -149,6 +152,7 @@ impl Default for Diffuse {
             color: Color::WHITE,
             roughness: Scalar::Value(0.0),
             version: Version::V4_5,
+            normal: None,
         }
     }
 }
@@ -169,6 +173,25 @@ impl Default for Colored {
     }
 }
 
+/// Lambert's law, to the other side.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Translucent {
+    /// The share of light that it passes on.
+    pub color: Color,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
+}
+
+impl Default for Translucent {
+    fn default() -> Self {
+        Self {
+            color: Color::WHITE,
+            normal: None,
+        }
+    }
+}
+
 /// Ashikhmin's velvet.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -177,6 +200,8 @@ pub struct Velvet {
     pub color: Color,
     /// How far fibres lean from the normal, as the tangent of an angle.
     pub sigma: Scalar,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
 }
 
 impl Default for Velvet {
@@ -184,6 +209,7 @@ impl Default for Velvet {
         Self {
             color: Color::WHITE,
             sigma: Scalar::Value(1.0),
+            normal: None,
         }
     }
 }
@@ -196,6 +222,8 @@ pub struct Sheen {
     pub color: Color,
     /// How loose the fibres are, 0 to 1.
     pub roughness: Scalar,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
 }
 
 impl Default for Sheen {
@@ -203,6 +231,7 @@ impl Default for Sheen {
         Self {
             color: Color::WHITE,
             roughness: Scalar::Value(0.5),
+            normal: None,
         }
     }
 }
@@ -497,9 +526,12 @@ impl Material {
                 let at = at.key("diffuse");
                 check.color(&diffuse.color, Range::UNIT, at.key("color"));
                 check.scalar(&diffuse.roughness, Range::UNIT, at.key("roughness"));
+                check.normal(diffuse.normal.as_ref(), &at);
             }
             Self::Translucent(part) => {
-                check.color(&part.color, Range::UNIT, at.key("translucent").key("color"));
+                let at = at.key("translucent");
+                check.color(&part.color, Range::UNIT, at.key("color"));
+                check.normal(part.normal.as_ref(), &at);
             }
             Self::Transparent(part) => {
                 check.color(&part.color, Range::UNIT, at.key("transparent").key("color"));
@@ -508,11 +540,13 @@ impl Material {
                 let at = at.key("velvet");
                 check.color(&velvet.color, Range::UNIT, at.key("color"));
                 check.scalar(&velvet.sigma, Range::NonNegative, at.key("sigma"));
+                check.normal(velvet.normal.as_ref(), &at);
             }
             Self::Sheen(sheen) => {
                 let at = at.key("sheen");
                 check.color(&sheen.color, Range::UNIT, at.key("color"));
                 check.scalar(&sheen.roughness, Range::UNIT, at.key("roughness"));
+                check.normal(sheen.normal.as_ref(), &at);
             }
             Self::Emission(emission) => {
                 let at = at.key("emission");
@@ -544,6 +578,25 @@ impl Material {
             Self::Layered(layered) => layered.check(check, &at.key("layered")),
             Self::Principled(principled) => principled.check(check, &at.key("principled")),
             Self::OpenPbr(surface) => surface.check(check, &at.key("openpbr")),
+        }
+    }
+
+    /// What replaces its interpolated normal.
+    #[must_use]
+    pub fn normal(&self) -> Option<&NormalMap> {
+        match self {
+            Self::Conductor(Conductor { rough, .. })
+            | Self::Dielectric(Dielectric { rough, .. })
+            | Self::Refraction(Dielectric { rough, .. })
+            | Self::RoughDiffuse(RoughDiffuse { rough, .. }) => rough.normal.as_ref(),
+            Self::Diffuse(part) => part.normal.as_ref(),
+            Self::Translucent(part) => part.normal.as_ref(),
+            Self::Velvet(part) => part.normal.as_ref(),
+            Self::Sheen(part) => part.normal.as_ref(),
+            Self::Layered(part) => part.normal.as_ref(),
+            Self::Principled(part) => part.normal.as_ref(),
+            Self::OpenPbr(part) => part.normal.as_ref(),
+            Self::Emission(_) | Self::Transparent(_) | Self::Mix(_) | Self::Sum(_) => None,
         }
     }
 
@@ -635,5 +688,6 @@ impl Rough {
             }
         }
         check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
+        check.normal(self.normal.as_ref(), at);
     }
 }

@@ -17,6 +17,7 @@ mod overrides;
 mod principled;
 mod problem;
 mod read;
+mod relief;
 mod rough;
 mod settings;
 mod transform;
@@ -34,11 +35,12 @@ pub use layered::{Interface, Layered, Slab};
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
     Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,
-    Reflectance, RoughDiffuse, Sheen, Sum, Velvet,
+    Reflectance, RoughDiffuse, Sheen, Sum, Translucent, Velvet,
 };
 pub use openpbr::OpenPbr;
 pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Version};
 pub use problem::{Problem, Problems};
+pub use relief::{NormalMap, NormalSpace};
 pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
 pub use transform::Transform;
@@ -116,6 +118,10 @@ pub struct Description {
     /// The directory that the file's relative paths start from.
     #[serde(skip)]
     pub directory: PathBuf,
+    /// For each material that looks along the surface, as normal maps do, the first
+    /// place that says so: what is wrong with meshes shows when they are read.
+    #[serde(skip)]
+    pub perturbed: BTreeMap<String, String>,
 }
 
 impl Description {
@@ -154,9 +160,9 @@ impl Description {
 
     /// What the tree says, if nothing is wrong with it or was before.
     fn from_tree(tree: &mut Node, mut sources: Sources<'_>) -> Result<Self, Problems> {
-        let description = read::read::<Self>(tree, &mut sources);
-        if let Some(description) = &description {
-            validate::description(description, tree, &mut sources);
+        let mut description = read::read::<Self>(tree, &mut sources);
+        if let Some(description) = &mut description {
+            description.perturbed = validate::description(description, tree, &mut sources);
         }
         match description {
             Some(description) if sources.count() == 0 => Ok(description),

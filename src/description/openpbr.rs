@@ -1,5 +1,6 @@
 //! OpenPBR 1.1.1, by the names of its parameters.
 
+use super::relief::NormalMap;
 use super::rough::Tangent;
 use super::validate::{At, Check, Range};
 use super::value::{Color, Scalar};
@@ -15,6 +16,8 @@ macro_rules! parameters {
         pub struct OpenPbr {
             /// Where the tangent comes from.
             pub tangent: Tangent,
+            /// What replaces the interpolated normal.
+            pub normal: Option<NormalMap>,
             $($(#[$doc])* pub $key: $type,)*
         }
 
@@ -22,6 +25,7 @@ macro_rules! parameters {
             fn default() -> Self {
                 Self {
                     tangent: Tangent::default(),
+                    normal: None,
                     $($key: <$type>::from($default),)*
                 }
             }
@@ -29,6 +33,7 @@ macro_rules! parameters {
 
         impl OpenPbr {
             pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+                check.normal(self.normal.as_ref(), at);
                 $(parameters!(@$type check, &self.$key, $range, at.key(stringify!($key)));)*
             }
         }

@@ -1,5 +1,6 @@
 //! Blender's Principled BSDF, by the sockets of its node.
 
+use super::relief::NormalMap;
 use super::rough::Tangent;
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
@@ -61,6 +62,8 @@ pub struct Principled {
     pub multiple: bool,
     /// Where the tangent comes from.
     pub tangent: Tangent,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
     /// The values.
     pub sockets: Sockets,
 }
@@ -150,6 +153,7 @@ macro_rules! raw {
             distribution: Option<Facets>,
             #[serde(default)]
             tangent: Tangent,
+            normal: Option<NormalMap>,
             $($key: Option<Socket>,)*
         }
 
@@ -332,6 +336,7 @@ impl TryFrom<Raw> for Principled {
             layering: raw.layering,
             multiple: raw.distribution.unwrap_or(usual) == Facets::MultiGgx,
             tangent: raw.tangent,
+            normal: raw.normal,
             sockets,
         })
     }
@@ -339,6 +344,7 @@ impl TryFrom<Raw> for Principled {
 
 impl Principled {
     pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+        check.normal(self.normal.as_ref(), at);
         match &self.sockets {
             Sockets::V3(sockets) => sockets.check(check, at),
             Sockets::V4(sockets) => sockets.check(check, at),

@@ -214,6 +214,13 @@ impl<'a> Sources<'a> {
         });
     }
 
+    /// A place and the path to it, as problems begin.
+    pub fn describe(&self, place: Place, path: &str) -> String {
+        let (name, _) = &self.texts[place.source as usize];
+        let (line, column) = (place.line, place.column);
+        bounded(&format!("{name}:{line}:{column}: {path}"), MAX_MESSAGE)
+    }
+
     pub fn report_whole(&mut self, source: usize, message: &str) {
         let name = &self.texts[source].0;
         self.problems

@@ -1,5 +1,6 @@
 //! The keys that all rough materials share.
 
+use super::relief::NormalMap;
 use super::value::{Clash, Scalar};
 pub use crate::bsdf::Distribution;
 use serde::Deserialize;
@@ -18,6 +19,8 @@ pub struct Rough {
     pub rotation: Scalar,
     /// Where the tangent comes from.
     pub tangent: Tangent,
+    /// What replaces the interpolated normal.
+    pub normal: Option<NormalMap>,
 }
 
 /// How rough, in the way the file says it.
@@ -93,6 +96,7 @@ macro_rules! raw_rough {
                 rotation: Option<Scalar>,
                 #[serde(default)]
                 tangent: Tangent,
+                normal: Option<NormalMap>,
                 $($key: $type,)*
             }
 
@@ -106,6 +110,7 @@ macro_rules! raw_rough {
                         roughness: roughness_of(self.distribution, alphas, blender)?,
                         rotation: self.rotation.take().unwrap_or(Scalar::Value(0.0)),
                         tangent: self.tangent,
+                        normal: self.normal.take(),
                     })
                 }
             }

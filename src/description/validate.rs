@@ -5,20 +5,26 @@ use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
-    Material, Object, Opening, Projection, Sampling, Scalar, Texture, Transform, World,
+    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Texture, Transform, World,
 };
 use crate::text::excerpt;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// In pixels. More would need over 10 GB for the sums alone.
 const MAX_SIDE: u32 = 32_768;
 
-/// Checks a description against the tree it came from.
-pub(super) fn description(description: &Description, tree: &Node, sources: &mut Sources) {
+/// Checks a description against the tree it came from; gives
+/// [`Description::perturbed`].
+pub(super) fn description(
+    description: &Description,
+    tree: &Node,
+    sources: &mut Sources,
+) -> BTreeMap<String, String> {
     let mut check = Check {
         tree,
         sources,
         in_scene: true,
+        perturbed: BTreeMap::new(),
     };
     let root = At::root();
     if description.version != 1 {
@@ -48,6 +54,7 @@ pub(super) fn description(description: &Description, tree: &Node, sources: &mut 
     for (index, light) in description.lights.iter().enumerate() {
         check.light(light, root.key("lights").index(index));
     }
+    check.perturbed
 }
 
 /// Checks a material that stands alone.
@@ -56,6 +63,7 @@ pub(super) fn material(material: &Material, tree: &Node, sources: &mut Sources) 
         tree,
         sources,
         in_scene: false,
+        perturbed: BTreeMap::new(),
     };
     material.check(&mut check, At::root());
 }
@@ -128,6 +136,7 @@ pub(super) struct Check<'a, 's> {
     sources: &'a mut Sources<'s>,
     /// Whether there are materials and textures to name.
     in_scene: bool,
+    perturbed: BTreeMap<String, String>,
 }
 
 impl Check<'_, '_> {
@@ -140,6 +149,21 @@ impl Check<'_, '_> {
         // A value that the file leaves out has the place of what lacks it.
         let place: Place = node.place;
         self.sources.report(place, dotted(&path), message, nearest);
+    }
+
+    /// Keeps where a material looks along the surface.
+    pub(super) fn needs_uvs(&mut self, At(steps): &At) {
+        if let [Step::Key(_), Step::Key(material), ..] = &steps[..] {
+            let (node, path) = self.tree.descend(steps);
+            let place = self.sources.describe(node.place, &dotted(&path));
+            self.perturbed.entry(material.clone()).or_insert(place);
+        }
+    }
+
+    pub(super) fn normal(&mut self, normal: Option<&NormalMap>, at: &At) {
+        if let Some(normal) = normal {
+            normal.check(self, at.key("normal"));
+        }
     }
 
     pub(super) fn number(&mut self, value: f32, range: Range, at: At) {

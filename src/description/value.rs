@@ -71,6 +71,10 @@ pub(super) fn one() -> f32 {
     1.0
 }
 
+pub(super) fn whole() -> Scalar {
+    Scalar::Value(1.0)
+}
+
 pub(super) fn ones<const N: usize>() -> [f32; N] {
     [1.0; N]
 }

@@ -62,6 +62,7 @@ pub(super) fn assemble(
         triangles: Vec::with_capacity(triangles),
         normals: has_normals.then(|| Vec::with_capacity(vertices)),
         uvs: has_uvs.then(|| Vec::with_capacity(vertices)),
+        tangents: None,
         material_of_triangle: (names.len() > 1).then(|| Vec::with_capacity(triangles)),
         material_names: names,
     };

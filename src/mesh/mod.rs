@@ -8,6 +8,7 @@ mod assemble;
 mod feed;
 mod lines;
 mod polygons;
+mod tangents;
 
 use lines::Refusal;
 use std::fmt;
@@ -26,6 +27,10 @@ pub struct Mesh {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates, v upwards.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// Unit tangents along u, and the sign that makes sign · n × t the bitangent along
+    /// v; zero where texture coordinates have no direction. Only
+    /// [`Mesh::add_tangents`] makes them.
+    pub tangents: Option<Vec<[f32; 4]>>,
     /// For each triangle an index into `material_names`; absent when all have
     /// the first name, or there is none.
     pub material_of_triangle: Option<Vec<u16>>,

@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use arrayvec::ArrayVec;
 
 use super::material::{
-    Facet, Factor, Leaf, Material, Number, Reflectance, RoughMaterial, Roughness, Tangent, Tint,
-    WeightedLeaf,
+    Facet, Factor, Leaf, Material, NormalMap, Number, Perturbation, Reflectance, RoughMaterial,
+    Roughness, Tangent, Tint, WeightedLeaf,
 };
 use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, WhiteFacets};
 use crate::color::Rgb;
@@ -52,6 +52,8 @@ pub enum MaterialError {
 pub struct Needs {
     /// Whether it looks at texture coordinates.
     pub uvs: bool,
+    /// Whether it looks along the axes of texture coordinates that normal maps have.
+    pub tangents: bool,
     /// What a kernel has to have.
     pub features: Features,
     /// What is rendered otherwise than the file says, for people.
@@ -308,12 +310,31 @@ impl<'a> Compiler<'a> {
         if self.closures > MAX_CLOSURES {
             return Err(MaterialError::TooManyClosures);
         }
+        let perturbation = self.perturbation(material)?;
         self.leaves.push(WeightedLeaf {
             share: above.share,
             factors: above.factors.clone(),
             leaf,
+            perturbation,
         });
         Ok(())
+    }
+
+    fn perturbation(
+        &mut self,
+        material: &desc::Material,
+    ) -> Result<Option<Box<Perturbation>>, MaterialError> {
+        let Some(map) = material.normal() else {
+            return Ok(None);
+        };
+        self.need_if(Features::NORMAL_MAPS, true);
+        self.needs.tangents |= map.space == desc::NormalSpace::Tangent;
+        let normal = NormalMap {
+            texture: self.texture(&map.texture)?,
+            strength: self.number(&map.strength)?,
+            space: map.space,
+        };
+        Ok(Some(Box::new(Perturbation { normal })))
     }
 
     fn add_part(&mut self, part: &desc::MaterialRef, above: &Above) -> Result<(), MaterialError> {

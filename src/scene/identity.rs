@@ -39,6 +39,7 @@ pub(super) fn identity(
         lights,
         frames: _,
         directory: _,
+        perturbed: _,
     } = description;
     let Film {
         width,
@@ -160,6 +161,8 @@ fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
         triangles,
         normals,
         uvs,
+        // They follow from the rest.
+        tangents: _,
         material_of_triangle,
         material_names,
     } = mesh;

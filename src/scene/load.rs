@@ -1,6 +1,7 @@
 //! Files that a description names, read in parallel, all errors together.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use rayon::prelude::*;
 
@@ -46,10 +47,10 @@ impl Assets {
             .meshes
             .par_iter()
             .filter(|(name, _)| !stage.has_mesh(name))
-            .filter_map(|(name, uvs)| {
+            .filter_map(|(name, used)| {
                 let path = description.resolve_path(&description.meshes.get(name)?.file);
                 let wanted = Wanted {
-                    uvs: *uvs,
+                    uvs: used.uvs,
                     normals: true,
                 };
                 // A mesh takes about as much as its text.
@@ -58,6 +59,12 @@ impl Assets {
                     .take(length, format!("the mesh {}", path.display()))
                     .map_err(|e| e.to_string())
                     .and_then(|()| Mesh::load(&path, wanted).map_err(|e| e.to_string()));
+                let loaded = loaded.and_then(|(mut mesh, repairs)| {
+                    if used.tangents {
+                        add_tangents(&mut mesh, &path, budget)?;
+                    }
+                    Ok((mesh, repairs))
+                });
                 Some((name.clone(), loaded))
             })
             .collect();
@@ -131,25 +138,46 @@ impl Assets {
     }
 }
 
+fn add_tangents(mesh: &mut Mesh, path: &Path, budget: &Budget) -> Result<(), String> {
+    // The algorithm's own, for each corner, by measurement.
+    const BYTES_PER_CORNER: u64 = 100;
+    let bytes = 3 * BYTES_PER_CORNER * mesh.triangles.len() as u64;
+    budget
+        .take(bytes, format!("the tangents of {}", path.display()))
+        .map_err(|e| e.to_string())?;
+    mesh.add_tangents();
+    Ok(())
+}
+
 /// What objects reach.
 #[derive(Default)]
 struct Used {
-    /// Mesh names, and whether their texture coordinates are looked at.
-    meshes: BTreeMap<String, bool>,
+    /// By name.
+    meshes: BTreeMap<String, UsedMesh>,
+}
+
+/// What materials look at of a mesh.
+#[derive(Clone, Copy, Debug, Default)]
+struct UsedMesh {
+    uvs: bool,
+    tangents: bool,
 }
 
 impl Used {
     fn by(description: &Description, materials: &mut Materials<'_>) -> Self {
         let mut used = Self::default();
         for object in &description.objects {
-            let mut uvs = false;
+            let mut mesh = UsedMesh::default();
             for name in materials_of(object, materials) {
                 // What is wrong with it is told when an object turns out to have it.
                 if let Some(Ok(compiled)) = materials.get(&name) {
-                    uvs |= compiled.needs.uvs;
+                    mesh.uvs |= compiled.needs.uvs;
+                    mesh.tangents |= compiled.needs.tangents;
                 }
             }
-            *used.meshes.entry(object.mesh.clone()).or_default() |= uvs;
+            let known = used.meshes.entry(object.mesh.clone()).or_default();
+            known.uvs |= mesh.uvs;
+            known.tangents |= mesh.tangents;
         }
         used
     }

@@ -16,8 +16,8 @@ pub use compile::{Compiled, MaterialError, Materials, Needs, compile_alone};
 pub use error::ResolveError;
 pub use load::Assets;
 pub use material::{
-    Facet, Factor, Leaf, Material, Number, Point, Reflectance, RoughMaterial, Roughness, Tangent,
-    Tint, WeightedLeaf, blender_alphas,
+    Facet, Factor, Ground, Leaf, Material, NormalMap, Number, Perturbation, Point, Reflectance,
+    RoughMaterial, Roughness, Tangent, Tint, WeightedLeaf, blender_alphas,
 };
 pub use resolve::{Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
@@ -49,6 +49,9 @@ pub struct SceneMesh {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates for each vertex.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// See [`crate::mesh::Mesh::tangents`]; in the objects' space, wherever the
+    /// positions are.
+    pub tangents: Option<Vec<[f32; 4]>>,
     /// For each triangle, which of the object's materials it has; all have the
     /// first without it.
     pub slots: Option<Vec<u16>>,
@@ -77,6 +80,8 @@ pub struct Object {
     pub to_world: Option<Affine3A>,
     /// Takes normals from object space to world space; not normalised.
     pub normal_to_world: Mat3A,
+    /// The inverse.
+    pub normal_to_object: Mat3A,
     /// World space to the box round the mesh, each side from −½ to ½; there
     /// only when a material has a radial tangent.
     pub world_to_box: Option<Affine3A>,
@@ -186,6 +191,7 @@ impl Scene {
             material: object.materials[slot],
             object: object_index,
             triangle: hit.triangle,
+            weights: Vec2::new(u, v),
             along_u,
             right_handed,
             in_box,
@@ -211,10 +217,17 @@ impl Scene {
     #[must_use]
     #[inline]
     pub fn receiver(&self, surface: &Surface) -> Receiver {
-        let one_sided = self.lights.are_many() && !self.materials[surface.material].transmits();
+        let material = &self.materials[surface.material];
+        let one_sided = self.lights.are_many() && !material.transmits();
+        // Each closure has a horizon of its own there; all are above the true one.
+        let normal = if material.is_perturbed() {
+            surface.geometric_normal
+        } else {
+            surface.normal
+        };
         Receiver {
             position: surface.position,
-            normal: one_sided.then_some(surface.normal),
+            normal: one_sided.then_some(normal),
         }
     }
 
@@ -227,11 +240,26 @@ impl Scene {
             .sum()
     }
 
+    fn ground(&self, object: usize) -> Ground<'_> {
+        let object = &self.objects[object];
+        Ground {
+            textures: &self.textures,
+            on: Some((object, &self.meshes[object.mesh])),
+        }
+    }
+
+    /// The shading normal that a noise filter takes, see [`Material::normal`].
+    #[must_use]
+    pub fn normal(&self, surface: &Surface, view: View) -> Vec3 {
+        let point = Point::shaded(self.ground(surface.object), surface, view);
+        self.materials[surface.material].normal(&point, surface)
+    }
+
     /// The closures at a surface point for who looks at it, for the features `F`.
     #[must_use]
     #[inline]
     pub fn bsdf<const F: u32>(&self, surface: &Surface, view: View) -> Bsdf<F> {
-        self.materials[surface.material].bsdf(&self.textures, surface, view)
+        self.materials[surface.material].bsdf(self.ground(surface.object), surface, view)
     }
 
     /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle towards `wo`,
@@ -239,7 +267,8 @@ impl Scene {
     /// weights of its second and third corner.
     #[must_use]
     pub fn emission_at(&self, emitter: u32, [u, v]: [f32; 2], wo: Vec3) -> Rgb {
-        let object = &self.objects[self.emitters[emitter as usize] as usize];
+        let index = self.emitters[emitter as usize];
+        let object = &self.objects[index as usize];
         let Some(first) = object.first_emitter else {
             return Rgb::ZERO;
         };
@@ -264,7 +293,7 @@ impl Scene {
         let outward = if object.mirrored { -cross } else { cross };
         let cos = outward.normalize_or_zero().dot(wo);
         let point = Point {
-            textures: &self.textures,
+            ground: self.ground(index as usize),
             uv,
             cos: cos.abs(),
             front: cos >= 0.0,
@@ -277,7 +306,7 @@ impl Scene {
     /// W·m⁻²·sr⁻¹.
     #[must_use]
     pub fn emission(&self, surface: &Surface, view: View) -> Rgb {
-        let point = Point::shining(&self.textures, surface, view);
+        let point = Point::shining(self.ground(surface.object), surface, view);
         self.materials[surface.material].emission(&point)
     }
 
@@ -285,7 +314,7 @@ impl Scene {
     /// [`Material::albedo`].
     #[must_use]
     pub fn albedo(&self, surface: &Surface, view: View) -> Rgb {
-        let point = Point::shaded(&self.textures, surface, view);
+        let point = Point::shaded(self.ground(surface.object), surface, view);
         self.materials[surface.material].albedo(&point)
     }
 }

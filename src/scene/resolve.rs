@@ -256,6 +256,20 @@ impl<'a> MaterialTable<'a> {
         }
     }
 
+    /// Where the first of these materials that perturbs normals says so.
+    fn perturbed_among(
+        &self,
+        indices: &[usize],
+        places: &BTreeMap<String, String>,
+    ) -> Option<String> {
+        let mut names = self
+            .indices
+            .iter()
+            .filter(|(_, index)| indices.contains(index) && self.compiled[**index].is_perturbed());
+        let (name, _) = names.next()?;
+        Some(places.get(name).unwrap_or(name).clone())
+    }
+
     /// The index of the material of this name; `None` if there is no such name.
     fn index(&mut self, name: &str) -> Option<usize> {
         if let Some(&index) = self.indices.get(name) {
@@ -295,11 +309,13 @@ struct Placing<'a> {
     placed: BTreeMap<String, (usize, usize, Vec<String>)>,
     /// Indices into `scene_meshes`.
     shared: Vec<usize>,
+    /// See [`Description::perturbed`].
+    perturbed: &'a BTreeMap<String, String>,
 }
 
 impl<'a> Placing<'a> {
     fn new(
-        description: &Description,
+        description: &'a Description,
         meshes: BTreeMap<String, Mesh>,
         contents: &'a Contents,
     ) -> Self {
@@ -315,6 +331,7 @@ impl<'a> Placing<'a> {
             lent: Vec::new(),
             placed: BTreeMap::new(),
             shared: Vec::new(),
+            perturbed: &description.perturbed,
         }
     }
 
@@ -375,6 +392,14 @@ impl<'a> Placing<'a> {
         }
         let (mesh, shared, slots) = self.placed[&object.mesh].clone();
         let material_indices = assign(&object.materials, &slots, name, materials)?;
+        if self.scene_meshes[mesh].uvs.is_none() {
+            if let Some(place) = materials.perturbed_among(&material_indices, self.perturbed) {
+                return Err(format!(
+                    "{place}: this needs texture coordinates, and the mesh `{}` of {name} has none",
+                    object.mesh
+                ));
+            }
+        }
         let geometry = if alone {
             Geometry::Mesh {
                 vertices: Arc::clone(&self.scene_meshes[mesh].vertices),
@@ -388,6 +413,7 @@ impl<'a> Placing<'a> {
             mesh,
             to_world: (!alone).then_some(to_world),
             normal_to_world,
+            normal_to_object: Mat3A::from(linear.transpose()),
             world_to_box: None,
             mirrored: determinant < 0.0,
             materials: material_indices,
@@ -461,6 +487,7 @@ fn scene_mesh(mesh: Mesh, place: Option<(&Affine3A, &Mat3A)>) -> SceneMesh {
         triangles: Arc::new(mesh.triangles),
         normals,
         uvs: mesh.uvs,
+        tangents: mesh.tangents,
         slots: mesh.material_of_triangle,
     }
 }

@@ -30,6 +30,8 @@ pub struct Surface {
     pub object: usize,
     /// The triangle within the object's mesh.
     pub triangle: u32,
+    /// Barycentric weights of the triangle's second and third corner.
+    pub weights: Vec2,
     /// ∂position/∂u, not normalised; zero where nothing needs it.
     pub along_u: Vec3,
     /// Whether ∂position/∂u, ∂position/∂v and the normal are right-handed: not so
@@ -83,6 +85,7 @@ impl Surface {
             material: 0,
             object: 0,
             triangle: 0,
+            weights: Vec2::ZERO,
             along_u: Vec3::X,
             right_handed: from_above,
             in_box: Vec3::X,

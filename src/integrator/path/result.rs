@@ -50,7 +50,7 @@ impl FirstHit {
     pub(super) fn of(scene: &Scene, path: &Path, surface: &Surface) -> Self {
         Self {
             albedo: scene.albedo(surface, path.view()),
-            normal: surface.normal,
+            normal: scene.normal(surface, path.view()),
             distance: path.last.travelled + path.to_surface,
         }
     }

@@ -4,6 +4,7 @@
 mod factor;
 mod layers;
 mod openpbr;
+mod perturbation;
 mod principled;
 mod rough;
 mod value;
@@ -12,9 +13,10 @@ mod walked;
 pub use factor::Factor;
 pub use layers::{BaseLayer, InterfaceLayer, LayeredMaterial, Layers, Relief, Slab};
 pub use openpbr::OpenPbr;
+pub use perturbation::{NormalMap, Perturbation};
 pub use principled::{Layering, Principled3, Principled4, Setup};
 pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
-pub use value::{Number, Point, Tint};
+pub use value::{Ground, Number, Point, Tint};
 
 use arrayvec::ArrayVec;
 use glam::Vec3;
@@ -67,6 +69,8 @@ pub struct WeightedLeaf {
     pub factors: ArrayVec<(Factor, bool), MAX_CLOSURES>,
     /// The leaf.
     pub leaf: Leaf,
+    /// What replaces its normal.
+    pub perturbation: Option<Box<Perturbation>>,
 }
 
 impl WeightedLeaf {
@@ -94,30 +98,35 @@ impl Material {
     /// The closures at a point, weighted for who looks at it.
     #[must_use]
     #[inline]
-    pub fn bsdf<const F: u32>(
-        &self,
-        textures: &[Texture],
-        surface: &Surface,
-        view: View,
-    ) -> Bsdf<F> {
+    pub fn bsdf<const F: u32>(&self, ground: Ground<'_>, surface: &Surface, view: View) -> Bsdf<F> {
         let mut bsdf = Bsdf::new(surface.geometric_normal);
         let most = if has::<F>(Features::MIXES) {
             MAX_CLOSURES
         } else {
             1
         };
-        let point = Point::shaded(textures, surface, view);
-        let seen = || seen_by_closures(surface.normal, surface.geometric_normal, view.wo);
-        // Layers are weighed by the albedo of what lies on them.
-        let layered = || Point {
-            cos: seen().dot(surface.normal).max(0.0),
-            ..point
-        };
+        let even = Point::shaded(ground, surface, view);
         for weighted in self.leaves.iter().take(most) {
             let share = if has::<F>(Features::MIXES) {
-                weighted.share_at::<F>(&point)
+                weighted.share_at::<F>(&even)
             } else {
                 1.0
+            };
+            let perturbed = match &weighted.perturbation {
+                Some(perturbation) if has::<F>(Features::NORMAL_MAPS) => {
+                    Some(perturbation.surface::<F>(&even, surface))
+                }
+                _ => None,
+            };
+            let (surface, point) = match &perturbed {
+                Some(surface) => (surface, Point::shaded(ground, surface, view)),
+                None => (surface, even),
+            };
+            let seen = || seen_by_closures(surface.normal, surface.geometric_normal, view.wo);
+            // Layers are weighed by the albedo of what lies on them.
+            let layered = || Point {
+                cos: seen().dot(surface.normal).max(0.0),
+                ..point
             };
             let isotropic = || Frame::about(surface.normal);
             let (closure, frame) = match &weighted.leaf {
@@ -178,7 +187,7 @@ impl Material {
     #[must_use]
     pub fn horizontal(&self, wo: Vec3) -> Bsdf {
         let view = View { wo, camera: false };
-        self.bsdf(&[], &Surface::horizontal(wo.z > 0.0), view)
+        self.bsdf(Ground::default(), &Surface::horizontal(wo.z > 0.0), view)
     }
 
     /// The radiance that leaves the point towards the viewer, W·m⁻²·sr⁻¹.
@@ -228,6 +237,34 @@ impl Material {
         self.leaves
             .iter()
             .any(|weighted| weighted.leaf.shines().is_some())
+    }
+
+    /// Whether some of it has a normal of its own.
+    #[must_use]
+    pub fn is_perturbed(&self) -> bool {
+        self.leaves
+            .iter()
+            .any(|weighted| weighted.perturbation.is_some())
+    }
+
+    /// The shading normal at a point: that of its leaves, weighted (unit length).
+    #[must_use]
+    pub fn normal(&self, point: &Point<'_>, surface: &Surface) -> Vec3 {
+        if !self.is_perturbed() {
+            return surface.normal;
+        }
+        let sum: Vec3 = self
+            .leaves
+            .iter()
+            .map(|weighted| {
+                let normal = match &weighted.perturbation {
+                    Some(perturbation) => perturbation.surface::<ALL>(point, surface).normal,
+                    None => surface.normal,
+                };
+                normal * weighted.share_at::<ALL>(point)
+            })
+            .sum();
+        sum.try_normalize().unwrap_or(surface.normal)
     }
 
     /// Whether light may reach it from behind.

@@ -2,17 +2,26 @@
 
 use glam::Vec2;
 
-use super::super::{Surface, View};
+use super::super::{Object, SceneMesh, Surface, View};
 use crate::color::{Rgb, luminance};
 use crate::features::{Features, has};
 use crate::texture::Channel;
 use crate::texture::Texture;
 
+/// What the values of materials are looked up in.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ground<'a> {
+    /// The scene's textures.
+    pub textures: &'a [Texture],
+    /// The object and its mesh; measurements of a material alone have none.
+    pub on: Option<(&'a Object, &'a SceneMesh)>,
+}
+
 /// A point that materials are looked up at, and who looks at it.
 #[derive(Clone, Copy, Debug)]
 pub struct Point<'a> {
-    /// The scene's textures.
-    pub textures: &'a [Texture],
+    /// What it is on.
+    pub ground: Ground<'a>,
     /// Texture coordinates.
     pub uv: Vec2,
     /// The cosine between the normal and the viewer, either way round: an interpolated
@@ -40,9 +49,9 @@ impl<'a> Point<'a> {
     /// A point as its closures see it: by the shading normal.
     #[must_use]
     #[inline(always)]
-    pub fn shaded(textures: &'a [Texture], surface: &Surface, view: View) -> Self {
+    pub fn shaded(ground: Ground<'a>, surface: &Surface, view: View) -> Self {
         Self {
-            textures,
+            ground,
             uv: surface.uv,
             cos: surface.normal.dot(view.wo).abs(),
             front: surface.front,
@@ -54,10 +63,10 @@ impl<'a> Point<'a> {
     /// know, too.
     #[must_use]
     #[inline(always)]
-    pub fn shining(textures: &'a [Texture], surface: &Surface, view: View) -> Self {
+    pub fn shining(ground: Ground<'a>, surface: &Surface, view: View) -> Self {
         Self {
             cos: surface.geometric_normal.dot(view.wo).max(0.0),
-            ..Self::shaded(textures, surface, view)
+            ..Self::shaded(ground, surface, view)
         }
     }
 }
@@ -78,7 +87,7 @@ impl Number {
         match self {
             Self::Constant(value) => value,
             Self::Texture(index, channel) if has::<F>(Features::TEXTURES) => {
-                point.textures[index].channel(point.uv.into(), channel)
+                point.ground.textures[index].channel(point.uv.into(), channel)
             }
             Self::Texture(..) => left_out(),
         }
@@ -136,7 +145,7 @@ impl Tint {
             Self::Constant(value) => value,
             Self::Texture(..) if !has::<F>(Features::TEXTURES) => left_out(),
             Self::Texture(index) => {
-                let [r, g, b, _] = point.textures[index].sample(point.uv.into());
+                let [r, g, b, _] = point.ground.textures[index].sample(point.uv.into());
                 Rgb::new(r, g, b)
             }
         }

@@ -1,0 +1,98 @@
+"""More tiny scenes for measure_parity.py: normal maps and what else textures do."""
+
+import numpy as np
+
+import bpy
+import common
+from parity_cases import case, lamp
+
+
+def image(name, pixels, space="Non-Color", alpha=False):
+    """A packed 8-bit image of stored values, (height, width, channels), bottom row first."""
+    pixels = np.rint(np.clip(pixels, 0.0, 1.0) * 255.0) / 255.0
+    height, width, channels = pixels.shape
+    img = bpy.data.images.new(name, width, height, alpha=alpha)
+    rgba = np.ones((height, width, 4), dtype=np.float32)
+    rgba[..., :channels] = pixels
+    img.pixels.foreach_set(rgba.ravel())
+    img.update()
+    img.pack()
+    img.colorspace_settings.name = space
+    return img
+
+
+def hills(size, tilt, seed=3):
+    """Normals that lean by up to about `tilt` as slopes, as stored."""
+    rng = np.random.default_rng(seed)
+    slopes = rng.uniform(-tilt, tilt, (size, size, 2))
+    normals = np.dstack([slopes, np.ones((size, size))])
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    return normals * 0.5 + 0.5
+
+
+def dome(scene, mat):
+    """A square of smooth normals on a mirrored, stretched object, its texture mirrored on half of
+    it, under a sun that stands high above all of its normals, where all horizons are far."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8, size=4.0)
+    ob = bpy.context.object
+    ob.name = ob.data.name = "Dome"
+    ob.scale, ob.rotation_euler = (-1.2, 0.9, 1.0), (0.0, 0.0, 0.4)
+    for vertex in ob.data.vertices:
+        vertex.co.z = -0.04 * (vertex.co.x ** 2 + vertex.co.y ** 2)
+    layer = ob.data.uv_layers[0]
+    uv = np.empty(len(layer.data) * 2, dtype=np.float32)
+    layer.data.foreach_get("uv", uv)
+    uv = uv.reshape(-1, 2)
+    uv[:, 0] = np.abs(uv[:, 0] - 0.5) * 3.0
+    layer.data.foreach_set("uv", uv.ravel())
+    common.smooth(ob)
+    ob.data.materials.append(mat)
+    lamp(scene, "SUN", (0.0, 0.0, 5.0), (0.8, 0.6, 0.0), watts=3.0)
+    common.camera(scene, (0.0, -2.0, 7.0), (0.0, 0.0, 0.0), 30.0)
+    return ob
+
+
+def diffuse():
+    """A white material and its node."""
+    return common.material("White", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+
+
+def normal_mapped(mat, node, space="TANGENT", strength=1.0):
+    """Feeds the node's normal with a map."""
+    tree = mat.node_tree
+    lookup, normal = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeNormalMap")
+    lookup.image = image("normals", hills(8, 0.2))
+    normal.space = space
+    normal.inputs["Strength"].default_value = strength
+    tree.links.new(lookup.outputs["Color"], normal.inputs["Color"])
+    tree.links.new(normal.outputs[0], node.inputs["Normal"])
+
+
+@case("A normal map: tangents of a texture mirrored on half of a stretched, mirrored object")
+def normal_map(scene):
+    mat, node = diffuse()
+    normal_mapped(mat, node)
+    dome(scene, mat)
+
+
+@case("As normal_map, by half, on flat faces")
+def normal_map_flat(scene):
+    mat, node = diffuse()
+    normal_mapped(mat, node, strength=0.5)
+    ob = dome(scene, mat)
+    ob.data.polygons.foreach_set("use_smooth", [False] * len(ob.data.polygons))
+
+
+@case("As normal_map, in object space")
+def normal_map_object(scene):
+    mat, node = diffuse()
+    normal_mapped(mat, node, space="OBJECT")
+    dome(scene, mat)
+
+
+@case("As normal_map, more than the map's, on a metal of one scattering", since=(4, 0, 0))
+def normal_map_metal(scene):
+    mat, node = common.material("Metal", "ShaderNodeBsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.6)
+    node.distribution = "GGX"
+    normal_mapped(mat, node, strength=1.5)
+    dome(scene, mat)
