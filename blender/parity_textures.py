@@ -4,7 +4,7 @@ import numpy as np
 
 import bpy
 import common
-from parity_cases import case, lamp
+from parity_cases import case, lamp, plane_from_above
 
 
 def image(name, pixels, space="Non-Color", alpha=False):
@@ -96,3 +96,81 @@ def normal_map_metal(scene):
     node.distribution = "GGX"
     normal_mapped(mat, node, strength=1.5)
     dome(scene, mat)
+
+
+# Images, on a plane that shines with them, seen from above
+
+def shining(scene, img, interpolation="Linear", extension="REPEAT", mapping=None):
+    """A plane with the image on it; returns its lookup node. UVs go from −1 to 2."""
+    plane_from_above(scene)
+    ground = bpy.data.objects["Ground"]
+    ground.scale = (0.1, 0.1, 1.0)
+    layer = ground.data.uv_layers[0]
+    uv = np.empty(len(layer.data) * 2, dtype=np.float32)
+    layer.data.foreach_get("uv", uv)
+    layer.data.foreach_set("uv", uv * 3.0 - 1.0)
+    mat, emission = common.material("Shining", "ShaderNodeEmission", Strength=1.0)
+    tree = mat.node_tree
+    lookup = tree.nodes.new("ShaderNodeTexImage")
+    lookup.image, lookup.interpolation, lookup.extension = img, interpolation, extension
+    if mapping:
+        coordinates, node = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+        node.vector_type = mapping.pop("vector_type", "POINT")
+        for name, value in mapping.items():
+            node.inputs[name].default_value = value
+        tree.links.new(coordinates.outputs["UV"], node.inputs["Vector"])
+        tree.links.new(node.outputs[0], lookup.inputs[0])
+    tree.links.new(lookup.outputs["Color"], emission.inputs["Color"])
+    ground.data.materials[0] = mat
+    return lookup
+
+
+def cells(alpha=False, seed=5):
+    """8 × 6 random pixels."""
+    rng = np.random.default_rng(seed)
+    return image("cells", rng.random((6, 8, 4 if alpha else 3)), "sRGB", alpha)
+
+
+@case("A texture clipped at its edges, which are halved by interpolation")
+def texture_clip(scene):
+    shining(scene, cells(), extension="CLIP")
+
+
+@case("A texture extended beyond its edges, nearest pixels")
+def texture_extend(scene):
+    shining(scene, cells(), "Closest", "EXTEND")
+
+
+@case("A texture mirrored at its edges", since=(3, 5, 0))
+def texture_mirror(scene):
+    shining(scene, cells(), extension="MIRROR")
+
+
+@case("Cubic interpolation, extended")
+def texture_cubic(scene):
+    shining(scene, cells(), "Cubic", "EXTEND")
+
+
+@case("A texture scaled, turned and moved")
+def texture_turned(scene):
+    shining(scene, cells(), mapping={"Rotation": (0.0, 0.0, 0.5), "Scale": (1.5, 0.7, 1.0),
+                                     "Location": (0.1, 0.2, 0.0)})
+
+
+@case("A texture placed by a Mapping node of the kind Texture, about two axes")
+def texture_placed(scene):
+    shining(scene, cells(), mapping={"vector_type": "TEXTURE", "Rotation": (0.4, 0.0, 0.5),
+                                     "Scale": (1.5, 0.7, 1.0), "Location": (0.1, 0.2, 0.0)})
+
+
+@case("A colour with alpha that nobody asks for: multiplied")
+def texture_alpha(scene):
+    shining(scene, cells(alpha=True))
+
+
+@case("A colour with alpha that is asked for: alpha weighs neighbours")
+def texture_alpha_asked(scene):
+    lookup = shining(scene, cells(alpha=True))
+    tree = lookup.id_data
+    emission = next(n for n in tree.nodes if n.type == "EMISSION")
+    tree.links.new(lookup.outputs["Alpha"], emission.inputs["Strength"])

@@ -3,7 +3,7 @@
 use smithwalk::description::{Description, Material};
 use smithwalk::memory::Budget;
 use smithwalk::mesh::{Mesh, Wanted};
-use smithwalk::texture::{ColorSpace, Interpolation, Texture, load_environment};
+use smithwalk::texture::{ColorSpace, Interpolation, Lookup, Texture, load_environment};
 use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -607,10 +607,11 @@ fn images() {
     let load = |name: &str| {
         Texture::load(
             &directory.join(name),
-            ColorSpace::Srgb,
-            Interpolation::Bilinear,
-            [1.0; 2],
-            [0.0; 2],
+            Lookup {
+                color_space: ColorSpace::Srgb,
+                interpolation: Interpolation::Bilinear,
+                ..Lookup::default()
+            },
         )
         .map(|_| ())
     };
@@ -692,10 +693,11 @@ fn mutated_images_never_panic() {
             std::fs::write(&path, &bytes).unwrap();
             let texture = Texture::load(
                 &path,
-                ColorSpace::Srgb,
-                Interpolation::Bilinear,
-                [1.0; 2],
-                [0.0; 2],
+                Lookup {
+                    color_space: ColorSpace::Srgb,
+                    interpolation: Interpolation::Bilinear,
+                    ..Lookup::default()
+                },
             );
             match texture {
                 Ok((texture, _)) => assert!(

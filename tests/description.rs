@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use smithwalk::description::{
     Aperture, AreaShape, Assignment, Axis, Channel, Color, Description, Estimator, Factor, Film,
-    Filter, LightKind, LightUnits, Material, MaterialRef, Opening, Projection, Reflectance,
-    Roughness, Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
+    Filter, LightKind, LightUnits, Material, MaterialRef, Opening, Placing, Projection,
+    Reflectance, Roughness, Sampling, Scalar, Scattering, SensorFit, Tangent, Transform, World,
 };
 use smithwalk::film::Aov;
 use smithwalk::texture::{ColorSpace, Interpolation};
@@ -136,8 +136,12 @@ fn what_is_left_out_has_the_documented_default() {
         read(text).textures["t"].interpolation,
         shown.textures["scratches"].interpolation
     );
-    assert_eq!(read(text).textures["t"].scale, [1.0; 2]);
-    assert_eq!(read(text).textures["t"].offset, [0.0; 2]);
+    let placing = Placing::Parts {
+        scale: [1.0; 2],
+        rotation: 0.0,
+        offset: [0.0; 2],
+    };
+    assert_eq!(read(text).textures["t"].placing, placing);
 
     let scene = read(
         "smithwalk: 1\nlights: [point: {power: 1}, spot: {power: 2}, sun: {strength: 3}]\n\

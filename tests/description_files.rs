@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use smithwalk::description::Channel;
 use smithwalk::memory::Budget;
 use smithwalk::mesh::{Mesh, Repair, Wanted};
-use smithwalk::texture::{self, ColorSpace, Interpolation, Texture, load_environment};
+use smithwalk::texture::{
+    self, ColorSpace, Interpolation, Lookup, Texture, UvTransform, load_environment,
+};
 use std::path::PathBuf;
 
 fn read(text: &str) -> (Mesh, Vec<Repair>) {
@@ -340,10 +342,11 @@ const PIXELS: [[u8; 3]; 6] = [
 fn load(name: &str, color_space: ColorSpace, interpolation: Interpolation) -> Texture {
     let (texture, repairs) = Texture::load(
         &directory().join(name),
-        color_space,
-        interpolation,
-        [1.0; 2],
-        [0.0; 2],
+        Lookup {
+            color_space,
+            interpolation,
+            ..Lookup::default()
+        },
     )
     .unwrap();
     assert_eq!(repairs, []);
@@ -480,10 +483,12 @@ fn channels_scale_and_offset() {
     }
     let (moved, _) = Texture::load(
         &path,
-        ColorSpace::Linear,
-        Interpolation::Closest,
-        [0.5, 1.0],
-        [0.5, 0.0],
+        Lookup {
+            color_space: ColorSpace::Linear,
+            interpolation: Interpolation::Closest,
+            transform: UvTransform::from_parts([0.5, 1.0], 0.0, [0.5, 0.0]),
+            ..Lookup::default()
+        },
     )
     .unwrap();
     assert_eq!(moved.sample([0.0, 0.5]), texture.sample([0.5, 0.5]));

@@ -29,4 +29,5 @@ mod relief;
 mod render;
 mod shading_normals;
 mod tables;
+mod textures;
 mod validate;

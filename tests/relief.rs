@@ -1,7 +1,8 @@
 //! Normals out of textures.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::common::folder;
 use glam::{Mat3, Vec3};
 use smithwalk::description::Description;
 use smithwalk::embree::Ray;
@@ -13,10 +14,7 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("relief-{name}"));
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
+        Self(folder(&format!("relief-{name}")))
     }
 
     fn write(&self, name: &str, text: &str) {

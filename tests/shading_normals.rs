@@ -111,13 +111,14 @@ fn layers_weigh_each_other_for_the_viewer_that_closures_see() {
                 let wo = wo * wo.z.signum();
                 let seen = seen_by_closures(normal, Vec3::Z, wo);
                 let mut surface = Surface::horizontal(true).with_normal(normal);
-                let leaning: Bsdf = material.bsdf(&[], &surface, View { wo, camera: false });
+                let leaning: Bsdf =
+                    material.bsdf(Ground::default(), &surface, View { wo, camera: false });
                 surface.geometric_normal = normal;
                 let view = View {
                     wo: seen,
                     camera: false,
                 };
-                let level: Bsdf = material.bsdf(&[], &surface, view);
+                let level: Bsdf = material.bsdf(Ground::default(), &surface, view);
                 let choice = rng.draw();
                 let weight = |bsdf: &Bsdf, wo: Vec3| {
                     let sample = bsdf.sample(wo, choice, &mut rng.clone());

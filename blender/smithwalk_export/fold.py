@@ -25,7 +25,8 @@ def _lerp(a, b, t):
     return a + (b - a) * t
 
 
-def _divide(a, b):
+def safe_divide(a, b):
+    """a / b, and 0 where b is."""
     return a / b if b != 0.0 else 0.0
 
 
@@ -62,7 +63,7 @@ MATH = {
     "ADD": lambda a, b, c: a + b,
     "SUBTRACT": lambda a, b, c: a - b,
     "MULTIPLY": lambda a, b, c: a * b,
-    "DIVIDE": lambda a, b, c: _divide(a, b),
+    "DIVIDE": lambda a, b, c: safe_divide(a, b),
     "MULTIPLY_ADD": lambda a, b, c: a * b + c,
     "POWER": lambda a, b, c: _power(a, b),
     "LOGARITHM": lambda a, b, c: _log(a, b),
@@ -86,7 +87,7 @@ MATH = {
     "MODULO": lambda a, b, c: math.fmod(a, b) if b != 0.0 else 0.0,
     "FLOORED_MODULO": lambda a, b, c: a - math.floor(a / b) * b if b != 0.0 else 0.0,
     "WRAP": _wrap,
-    "SNAP": lambda a, b, c: math.floor(_divide(a, b)) * b,
+    "SNAP": lambda a, b, c: math.floor(safe_divide(a, b)) * b,
     "PINGPONG": lambda a, b, c: _ping_pong(a, b),
     "SINE": lambda a, b, c: math.sin(a),
     "COSINE": lambda a, b, c: math.cos(a),
@@ -134,7 +135,7 @@ def _each(f):
 
 
 def _reflect(a, b):
-    n = _scaled(b, _divide(1.0, math.sqrt(_dot(b, b))))
+    n = _scaled(b, safe_divide(1.0, math.sqrt(_dot(b, b))))
     return tuple(x - 2.0 * _dot(a, n) * y for x, y in zip(a, n))
 
 
@@ -142,7 +143,7 @@ VECTOR_MATH = {
     "ADD": _each(lambda x, y, z: x + y),
     "SUBTRACT": _each(lambda x, y, z: x - y),
     "MULTIPLY": _each(lambda x, y, z: x * y),
-    "DIVIDE": _each(lambda x, y, z: _divide(x, y)),
+    "DIVIDE": _each(lambda x, y, z: safe_divide(x, y)),
     "MULTIPLY_ADD": _each(lambda x, y, z: x * y + z),
     "MINIMUM": _each(lambda x, y, z: min(x, y)),
     "MAXIMUM": _each(lambda x, y, z: max(x, y)),
@@ -152,17 +153,17 @@ VECTOR_MATH = {
     "ABSOLUTE": _each(lambda x, y, z: abs(x)),
     "MODULO": _each(lambda x, y, z: math.fmod(x, y) if y else 0.0),
     "WRAP": _each(_wrap),
-    "SNAP": _each(lambda x, y, z: math.floor(_divide(x, y)) * y),
+    "SNAP": _each(lambda x, y, z: math.floor(safe_divide(x, y)) * y),
     "SINE": _each(lambda x, y, z: math.sin(x)),
     "COSINE": _each(lambda x, y, z: math.cos(x)),
     "TANGENT": _each(lambda x, y, z: math.tan(x)),
     "CROSS_PRODUCT": lambda a, b, c, s: (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
                                          a[0] * b[1] - a[1] * b[0]),
-    "PROJECT": lambda a, b, c, s: _scaled(b, _divide(_dot(a, b), _dot(b, b))),
+    "PROJECT": lambda a, b, c, s: _scaled(b, safe_divide(_dot(a, b), _dot(b, b))),
     "REFLECT": lambda a, b, c, s: _reflect(a, b),
     "FACEFORWARD": lambda a, b, c, s: a if _dot(b, c) < 0.0 else _scaled(a, -1.0),
     "SCALE": lambda a, b, c, s: _scaled(a, s),
-    "NORMALIZE": lambda a, b, c, s: _scaled(a, _divide(1.0, math.sqrt(_dot(a, a)))),
+    "NORMALIZE": lambda a, b, c, s: _scaled(a, safe_divide(1.0, math.sqrt(_dot(a, a)))),
     "DOT_PRODUCT": lambda a, b, c, s: _dot(a, b),
     "DISTANCE": lambda a, b, c, s: math.dist(a, b),
     "LENGTH": lambda a, b, c, s: math.sqrt(_dot(a, a)),
@@ -303,7 +304,7 @@ def _clamp_node(node, read):
 
 
 def _map(kind, x, from_low, from_high, to_low, to_high, steps):
-    t = _divide(x - from_low, from_high - from_low)
+    t = safe_divide(x - from_low, from_high - from_low)
     if kind == "STEPPED":
         t = math.floor(t * (steps + 1.0)) / steps if steps > 0.0 else 0.0
     elif kind == "SMOOTHSTEP":

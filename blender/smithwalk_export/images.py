@@ -1,5 +1,6 @@
 """Image files beside the scene: copied, unpacked, or converted to PNG or EXR."""
 
+import itertools
 import os
 import shutil
 
@@ -40,31 +41,72 @@ class ImageWriter:
     def __init__(self, files, log):
         self.files = files
         self.log = log
-        self._written = {}  # (image name_full, alpha multiplied) → file name or None
+        self._written = {}  # image name_full → file name or None
 
-    def add(self, image, where, multiply_alpha=False):
-        """The file name of an image, or None (with a warning) if it has no pixels.
-
-        With `multiply_alpha` the stored colour is multiplied by the stored
-        alpha, as Cycles does where an image's alpha is not asked for.
-        """
-        multiply_alpha = multiply_alpha and self._has_alpha(image)
-        key = (image.name_full, multiply_alpha)
+    def add(self, image, where):
+        """The file name of an image, or None (with a warning) if it has no pixels."""
+        key = image.name_full
         if key not in self._written:
-            self._written[key] = self._write(image, where, multiply_alpha)
+            write = self._write_tiles if image.source == "TILED" else self._write
+            self._written[key] = write(image, where)
         return self._written[key]
+
+    def alpha(self, texture, file):
+        """The `alpha` key of a texture in this file: what Cycles does to its colour, or None.
+
+        Cycles multiplies by alpha as it loads what files hold unmultiplied (all but EXR), and
+        divides by it again where alpha is asked for, too.
+        """
+        if texture.alpha is None or not self._has_alpha(texture.image):
+            return None
+        multiplied = file.endswith(".exr")
+        if texture.alpha == "asked":
+            return "divide" if multiplied else "weigh"
+        return None if multiplied else "multiply"
 
     @staticmethod
     def _has_alpha(image):
-        if image.is_float or image.channels != 4:
+        if image.channels != 4:
             return False
         pixels = pixels_of(image)
-        return pixels is not None and bool((pixels[..., 3] < 1.0).any())
+        return pixels is None or bool((pixels[..., 3] < 1.0).any())
 
-    def _write(self, image, where, multiply_alpha):
+    def _write_tiles(self, image, where):
+        """The files of a tiled image under one name with `<UDIM>`."""
+        pattern = bpy.path.abspath(image.filepath, library=image.library)
+        folder, name = os.path.split(pattern)
+        sources = {tile.number: os.path.join(folder, name.replace("<UDIM>", str(tile.number)))
+                   for tile in image.tiles}
+        extensions = set()
+        for source in sources.values():
+            try:
+                with open(source, "rb") as f:
+                    extensions.add(_known_extension(f.read(16)))
+            except OSError as error:
+                self.log.wrong(where, f'image "{image.name}": {source}: {error.strerror}')
+                return None
+        if "<UDIM>" not in name or image.packed_files or len(extensions) != 1 or None in extensions:
+            self.log.wrong(where, f'image "{image.name}": only tiles in PNG, JPEG, EXR or HDR files of one kind, '
+                                  "not packed, are written")
+            return None
+        stem = unique_name(name.split("<UDIM>")[0].strip("._") or image.name, ())
+        extension = extensions.pop()
+        for n in itertools.count(1):
+            base = stem if n == 1 else f"{stem}_{n}"
+            wanted = {f"{base}.{number}{extension}": source for number, source in sources.items()}
+            made = {name: path for path, name in map(self.files.new, wanted)}
+            if made.keys() == wanted.keys():
+                break
+            for taken in made:
+                self.files.drop(taken)
+        for file, source in wanted.items():
+            shutil.copyfile(source, made[file])
+        return f"{base}.<UDIM>{extension}"
+
+    def _write(self, image, where):
         if image.source not in {"FILE", "GENERATED"}:
             self.log.warn(where, f'image "{image.name}" is a {image.source.lower()}: '
-                                 "only its current frame or first tile is written")
+                                 "only its current frame is written")
         stem = os.path.splitext(os.path.basename(image.filepath) or image.name)[0]
         stem = unique_name(stem, ())
         if image.source == "FILE" and not image.packed_file \
@@ -73,7 +115,7 @@ class ImageWriter:
             return None
 
         # The bytes as they are, when the renderer can read them: lossless.
-        if not image.is_dirty and image.source == "FILE" and not multiply_alpha:
+        if not image.is_dirty and image.source == "FILE":
             if image.packed_file:
                 data = image.packed_file.data
                 extension = _known_extension(data[:16])
@@ -93,9 +135,9 @@ class ImageWriter:
                     path, name = self.files.new(stem + extension)
                     shutil.copyfile(source, path)
                     return name
-        return self._convert(image, stem, where, multiply_alpha)
+        return self._convert(image, stem, where)
 
-    def _convert(self, image, stem, where, multiply_alpha):
+    def _convert(self, image, stem, where):
         pixels = pixels_of(image)
         if pixels is None:
             self.log.wrong(where, f'image "{image.name}" has no pixels')
@@ -105,9 +147,6 @@ class ImageWriter:
             rgba[..., :3] = pixels
         else:
             rgba[..., :pixels.shape[2]] = pixels
-        if multiply_alpha:
-            rgba[..., :3] *= rgba[..., 3:]
-            rgba[..., 3] = 1.0
         return self.save(rgba, stem, image.is_float, where)
 
     def save(self, rgba, stem, is_float, where):

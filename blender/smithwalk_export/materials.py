@@ -102,21 +102,30 @@ class MaterialWriter:
 
     def texture(self, texture, where):
         """The name in the scene of a texture, or None when its image has no pixels."""
-        key = (texture.image.name_full, texture.color_space, texture.interpolation, texture.scale,
-               texture.offset, texture.multiply_alpha)
+        key = (texture.image.name_full, texture.color_space, texture.interpolation, texture.extension,
+               texture.matrix, texture.alpha)
         if key not in self._textures:
             if self.images is None:  # a probe
                 return "probe"
-            file = self.images.add(texture.image, where, texture.multiply_alpha)
+            file = self.images.add(texture.image, where)
             name = None
             if file:
                 entry = {"file": file, "color_space": texture.color_space}
                 if texture.interpolation != "bilinear":
                     entry["interpolation"] = texture.interpolation
-                if texture.scale != (1.0, 1.0):
-                    entry["scale"] = list(texture.scale)
-                if texture.offset != (0.0, 0.0):
-                    entry["offset"] = list(texture.offset)
+                if texture.extension != "repeat":
+                    entry["extension"] = texture.extension
+                alpha = self.images.alpha(texture, file)
+                if alpha:
+                    entry["alpha"] = alpha
+                (a, b, c), (d, e, f) = texture.matrix
+                if b or d:
+                    entry["matrix"] = [[a, b, c], [d, e, f]]
+                else:
+                    if (a, e) != (1.0, 1.0):
+                        entry["scale"] = [a, e]
+                    if (c, f) != (0.0, 0.0):
+                        entry["offset"] = [c, f]
                 name = self._add_texture(file, entry)
             self._textures[key] = name
         return self._textures[key]

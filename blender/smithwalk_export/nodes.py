@@ -8,6 +8,7 @@ node is recorded, so that the rest can be named (`audit.py`).
 from dataclasses import dataclass, replace
 
 import bpy
+from mathutils import Euler, Matrix
 
 from . import fold
 from .fold import NotConstant, luminance
@@ -22,10 +23,10 @@ class Texture:
     image: bpy.types.Image
     color_space: str = "srgb"
     interpolation: str = "bilinear"
-    scale: tuple = (1.0, 1.0)
-    offset: tuple = (0.0, 0.0)
+    extension: str = "repeat"
+    matrix: tuple = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))  # from UVs to the image
     channel: str = None
-    multiply_alpha: bool = False  # as Cycles does to a colour whose Alpha is not asked for
+    alpha: str = None  # where it is one: whether it is "asked" for beside the colour, or "unasked"
 
 
 @dataclass(frozen=True)
@@ -218,50 +219,66 @@ class Graph:
         view.accept("image_user")  # frames of sequences are checked where the image is written
         if image is None:
             return (1.0, 0.0, 1.0)  # Cycles' colour of a missing image
-        for attribute, only in (("projection", "FLAT"), ("extension", "REPEAT")):
-            if getattr(view, attribute) != only:
-                return Unknown(f"{describe(node)} with {attribute} {getattr(node, attribute).lower()}")
+        if view.projection != "FLAT":
+            return Unknown(f"{describe(node)} with projection {node.projection.lower()}")
         view.accept("projection_blend")
-        if view.interpolation not in {"Closest", "Linear"}:
-            return Unknown(f"{describe(node)} with interpolation {node.interpolation.lower()}")
-        if image.source in {"TILED", "SEQUENCE", "MOVIE"}:
+        if image.source in {"SEQUENCE", "MOVIE"}:
             return Unknown(f'image "{image.name}", a {image.source.lower()} one')
         space = image.colorspace_settings.name
         if space != "sRGB" and space not in LINEAR_SPACES:
             return Unknown(f'image "{image.name}" in colour space {space}')
         asks_alpha = any(l.is_valid for l in node.outputs["Alpha"].links)
-        if asks_alpha and image.is_float and image.channels == 4 and image.alpha_mode in {"STRAIGHT", "PREMUL"}:
-            return Unknown(f'image "{image.name}" with colour and alpha in floats')  # Cycles divides by alpha
+        associated = image.alpha_mode in {"STRAIGHT", "PREMUL"} and space not in {"Non-Color", "Raw"}
+        if source.socket.name == "Alpha" and image.alpha_mode == "NONE":
+            return 1.0
         texture = Texture(
             image=image,
             color_space="srgb" if space == "sRGB" else "non_color",
-            interpolation="closest" if node.interpolation == "Closest" else "bilinear",
+            interpolation={"Closest": "closest", "Linear": "bilinear"}.get(view.interpolation, "cubic"),
+            extension=view.extension.lower(),
             channel="a" if source.socket.name == "Alpha" else None,
-            multiply_alpha=image.alpha_mode in {"STRAIGHT", "PREMUL"} and space not in {"Non-Color", "Raw"}
-            and not asks_alpha,
+            alpha=("asked" if asks_alpha else "unasked") if associated else None,
         )
         return self._place(texture, self.follow(node.inputs["Vector"], source.groups))
 
-    def _place(self, texture, vector):
-        """Read scale and offset off a Mapping node, down to the UVs."""
+    def _place(self, texture, vector, placed=Matrix()):
+        """Read how Mapping nodes place an image, down to the UVs; `placed` is what comes after."""
         if not vector.linked:
-            return texture
+            return _placed(texture, placed)
         node = vector.node
         view = self.view(node)
         if node.type == "UVMAP" or (node.type == "TEX_COORD" and vector.socket.name == "UV"):
             view.accept("uv_map")  # that it is the mesh's active one is checked per object
             if not view.get("from_instancer"):
-                return texture
-        elif node.type == "MAPPING" and view.vector_type == "POINT":
+                return _placed(texture, placed)
+        elif node.type == "MAPPING" and view.vector_type != "NORMAL":
             location, rotation, scale = (
-                self.evaluate(node.inputs[name], vector.groups) for name in ("Location", "Rotation", "Scale"))
+                self.evaluate(node.inputs[name], vector.groups) if node.inputs[name].enabled else (0.0, 0.0, 0.0)
+                for name in ("Location", "Rotation", "Scale"))
             below = self.follow(node.inputs["Vector"], vector.groups)
             # An empty Vector input of a Mapping node is (0, 0, 0), not the UVs.
-            if (all(isinstance(v, tuple) for v in (location, rotation, scale))
-                    and not any(rotation) and below.linked and below.node.type != "MAPPING"):
-                return self._place(replace(texture, scale=scale[:2], offset=location[:2]), below)
+            if all(isinstance(v, tuple) for v in (location, rotation, scale)) and below.linked:
+                step = _mapping(view.vector_type, location, rotation, scale)
+                return self._place(texture, below, placed @ step)
         self.forget(node)
         return Unknown(f"{describe(node)} as coordinates of an image")
+
+
+def _mapping(kind, location, rotation, scale):
+    """What a Mapping node of constants does to a vector."""
+    turn = Euler(rotation).to_matrix().to_4x4()
+    if kind == "TEXTURE":
+        shrink = Matrix.Diagonal([fold.safe_divide(1.0, s) for s in scale]).to_4x4()
+        return shrink @ turn.transposed() @ Matrix.Translation([-c for c in location])
+    move = Matrix.Translation(location if kind == "POINT" else (0.0, 0.0, 0.0))
+    return move @ turn @ Matrix.Diagonal(scale).to_4x4()
+
+
+def _placed(texture, matrix):
+    rows = tuple((matrix[i][0], matrix[i][1], matrix[i][3]) for i in range(2))
+    if rows[0][0] * rows[1][1] == rows[0][1] * rows[1][0]:
+        return Unknown(f'image "{texture.image.name}", flattened')
+    return replace(texture, matrix=rows)
 
 
 def _convert(value, from_type, to_type):

@@ -20,11 +20,12 @@ mod read;
 mod relief;
 mod rough;
 mod settings;
+mod texture;
 mod transform;
 mod validate;
 mod value;
 
-pub use crate::texture::{Channel, ColorSpace, Interpolation};
+pub use crate::texture::{Alpha, Channel, ColorSpace, Extension, Interpolation};
 pub use animation::{Animation, Changes, Frame};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
@@ -43,6 +44,7 @@ pub use problem::{Problem, Problems};
 pub use relief::{NormalMap, NormalSpace};
 pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
+pub use texture::{Placing, Texture};
 pub use transform::Transform;
 pub use value::{Color, Scalar};
 
@@ -248,26 +250,6 @@ impl Material {
             _ => Err(sources.into_problems()),
         }
     }
-}
-
-/// An image and how it is looked up.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Texture {
-    /// The image file, relative to the scene file.
-    pub file: PathBuf,
-    /// How stored values become linear ones.
-    #[serde(default)]
-    pub color_space: ColorSpace,
-    /// What happens between pixel centres.
-    #[serde(default)]
-    pub interpolation: Interpolation,
-    /// The factors that multiply u and v.
-    #[serde(default = "value::ones")]
-    pub scale: [f32; 2],
-    /// What is then added to u and v.
-    #[serde(default)]
-    pub offset: [f32; 2],
 }
 
 /// A mesh file.

@@ -5,7 +5,7 @@ use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
-    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Texture, Transform, World,
+    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, World,
 };
 use crate::text::excerpt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,7 +42,7 @@ pub(super) fn description(
         check.world(world, root.key("world"));
     }
     for (name, texture) in &description.textures {
-        check.texture(texture, root.key("textures").key(name));
+        texture.check(&mut check, root.key("textures").key(name));
     }
     for (name, material) in &description.materials {
         material.check(&mut check, root.key("materials").key(name));
@@ -402,12 +402,6 @@ impl Check<'_, '_> {
         };
         self.triple(color, Range::NonNegative, at.key(kind).key("color"));
         self.number(strength, Range::NonNegative, at.key(kind).key("strength"));
-    }
-
-    fn texture(&mut self, texture: &Texture, at: At) {
-        if texture.scale.contains(&0.0) {
-            self.report(at.key("scale"), "expected factors other than 0".to_owned());
-        }
     }
 
     /// Mixes that contain themselves.

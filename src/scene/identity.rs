@@ -2,7 +2,7 @@
 //! contents of the files that it names, the program and the processor.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -11,6 +11,7 @@ use crate::description::{Description, Film, Object, Sampling, Texture, World};
 use crate::embree;
 use crate::film::Identity;
 use crate::mesh::Mesh as Triangles;
+use crate::texture;
 
 /// Names what decides about the samples of a render, each with a hash or a short value.
 /// Where files lie, what objects are called, the number of samples and the exposure of
@@ -127,8 +128,7 @@ impl Contents {
         let meshes = assets.meshes.iter();
         let textures = assets.textures.keys().filter_map(|name| {
             let file = &description.textures.get(name)?.file;
-            let bytes = std::fs::read(description.resolve_path(file)).ok();
-            Some((name.clone(), bytes.map(|bytes| xxh3_128(&bytes))))
+            Some((name.clone(), of_files(&description.resolve_path(file))))
         });
         let image = assets.environment.as_ref();
         Self {
@@ -137,6 +137,18 @@ impl Contents {
                 .collect(),
             textures: textures.collect(),
             environment: image.map(|image| (image.width, of_floats(image.pixels.as_flattened()))),
+        }
+    }
+}
+
+/// Of the one file of a texture, or of its tiles with their numbers.
+fn of_files(path: &Path) -> Option<u128> {
+    let of_file = |path: &Path| std::fs::read(path).ok().map(|bytes| xxh3_128(&bytes));
+    match &texture::files(path).ok()?[..] {
+        [(None, path)] => of_file(path),
+        tiles => {
+            let hashes: Vec<_> = tiles.iter().map(|(n, path)| (n, of_file(path))).collect();
+            Some(xxh3_128(format!("{hashes:?}").as_bytes()))
         }
     }
 }

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::compile::Materials;
 use super::error::ResolveError;
 use super::stage::Stage;
-use crate::description::{Assignment, Description, Object, World};
+use crate::description::{self, Assignment, Description, Object, Placing, World};
 use crate::memory::Budget;
 use crate::mesh::{Mesh, Wanted};
-use crate::texture::{EnvironmentImage, Images, Texture, load_environment};
+use crate::texture::{EnvironmentImage, Images, Lookup, Texture, UvTransform, load_environment};
 
 /// The contents of a scene's files.
 #[derive(Debug, Default)]
@@ -76,13 +76,7 @@ impl Assets {
             .filter_map(|name| {
                 let texture = description.textures.get(name)?;
                 let path = description.resolve_path(&texture.file);
-                let loaded = images.texture(
-                    &path,
-                    texture.color_space,
-                    texture.interpolation,
-                    texture.scale,
-                    texture.offset,
-                );
+                let loaded = images.texture(&path, lookup(texture));
                 Some((name.clone(), loaded.map_err(|e| e.to_string())))
             })
             .collect();
@@ -135,6 +129,23 @@ impl Assets {
         } else {
             Err(ResolveError { problems: errors })
         }
+    }
+}
+
+fn lookup(texture: &description::Texture) -> Lookup {
+    Lookup {
+        color_space: texture.color_space,
+        interpolation: texture.interpolation,
+        extension: texture.extension,
+        alpha: texture.alpha,
+        transform: match texture.placing {
+            Placing::Parts {
+                scale,
+                rotation,
+                offset,
+            } => UvTransform::from_parts(scale, rotation, offset),
+            Placing::Matrix(rows) => UvTransform::from_rows(rows),
+        },
     }
 }
 

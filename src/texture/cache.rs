@@ -1,6 +1,7 @@
 //! Images that several textures share.
 
-use super::{ColorSpace, Image, Interpolation, Repair, Texture, TextureError, load};
+use super::tiles::{Tiles, files};
+use super::{Image, Lookup, Repair, Texture, TextureError, load};
 use crate::memory::Budget;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -32,11 +33,20 @@ impl<'a> Images<'a> {
     pub fn texture(
         &self,
         path: &Path,
-        color_space: ColorSpace,
-        interpolation: Interpolation,
-        scale: [f32; 2],
-        offset: [f32; 2],
+        lookup: Lookup,
     ) -> Result<(Texture, Vec<Repair>), TextureError> {
+        let mut images = Vec::new();
+        let mut repairs = Vec::new();
+        for (number, path) in files(path)? {
+            let (image, mended) = self.image(&path)?;
+            images.push((number, image));
+            repairs.extend(mended);
+        }
+        let images = Tiles::new(images);
+        Ok((Texture { images, lookup }, repairs))
+    }
+
+    fn image(&self, path: &Path) -> Loaded {
         // Where there is no such file, reading it will say so.
         let key = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let slot = {
@@ -46,14 +56,6 @@ impl<'a> Images<'a> {
         let loaded = slot.get_or_init(|| {
             load::image(path, self.budget).map(|(image, repairs)| (Arc::new(image), repairs))
         });
-        let (image, repairs) = loaded.clone()?;
-        let texture = Texture {
-            image,
-            color_space,
-            interpolation,
-            scale,
-            offset,
-        };
-        Ok((texture, repairs))
+        loaded.clone()
     }
 }

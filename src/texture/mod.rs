@@ -3,41 +3,23 @@
 mod cache;
 mod hdr;
 mod load;
+mod lookup;
+mod tiles;
 
 pub use cache::Images;
 pub use load::{EnvironmentImage, load_environment};
+pub use lookup::{Alpha, ColorSpace, Extension, Interpolation, Lookup, UvTransform};
+pub use tiles::files;
 
 use crate::memory::Budget;
 use exr::prelude::f16;
+use lookup::b_spline;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// How stored values become linear ones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ColorSpace {
-    /// Decoded by the sRGB transfer function; alpha is not.
-    Srgb,
-    /// Scene-linear Rec. 709, taken as it is.
-    Linear,
-    /// Numbers, taken as they are.
-    #[default]
-    NonColor,
-}
-
-/// What happens between pixel centres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Interpolation {
-    /// The four nearest pixels, weighted.
-    #[default]
-    Bilinear,
-    /// The nearest pixel.
-    Closest,
-}
+use tiles::Tiles;
 
 /// The part of a texture that stands for a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -56,15 +38,11 @@ pub enum Channel {
     Luminance,
 }
 
-/// An image that repeats over the plane of texture coordinates.
+/// Images on the plane of texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// Shared by all textures of the same file.
-    image: Arc<Image>,
-    color_space: ColorSpace,
-    interpolation: Interpolation,
-    scale: [f32; 2],
-    offset: [f32; 2],
+    images: Tiles,
+    lookup: Lookup,
 }
 
 /// Pixels as they are stored, row by row from the top, channels interleaved:
@@ -122,24 +100,20 @@ pub struct TextureError {
 }
 
 impl Texture {
-    /// Reads a PNG, JPEG, TIFF, HDR or EXR file. Texture coordinates are
-    /// multiplied by `scale`, then `offset` is added.
+    /// Reads a PNG, JPEG, TIFF, HDR or EXR file, or several where the path has
+    /// `<UDIM>` in its name: one for each square of texture coordinates, see
+    /// [`files`].
     ///
     /// # Errors
-    /// When the file can't be opened or is not a whole image.
-    pub fn load(
-        path: &Path,
-        color_space: ColorSpace,
-        interpolation: Interpolation,
-        scale: [f32; 2],
-        offset: [f32; 2],
-    ) -> Result<(Self, Vec<Repair>), TextureError> {
-        Images::new(&Budget::of_machine()).texture(path, color_space, interpolation, scale, offset)
+    /// When a file can't be opened or is not a whole image.
+    pub fn load(path: &Path, lookup: Lookup) -> Result<(Self, Vec<Repair>), TextureError> {
+        Images::new(&Budget::of_machine()).texture(path, lookup)
     }
 
-    /// In pixels, width and height.
+    /// In pixels, width and height; of several images, of the first.
     pub fn size(&self) -> [usize; 2] {
-        [self.image.width, self.image.height]
+        let image = self.images.first();
+        [image.width, image.height]
     }
 
     /// In bytes, of the pixels of all, each image once.
@@ -147,73 +121,107 @@ impl Texture {
         let mut seen = HashSet::new();
         textures
             .iter()
-            .filter(|texture| seen.insert(Arc::as_ptr(&texture.image)))
-            .map(|texture| texture.image.memory())
+            .flat_map(|texture| texture.images.all())
+            .filter(|image| seen.insert(Arc::as_ptr(image)))
+            .map(|image| image.memory())
             .sum()
     }
 
-    /// Linear red, green and blue, and alpha, not multiplied into them, at
-    /// texture coordinates with v upwards: (0, 0) is the lower left corner of
-    /// the lower left pixel.
+    /// Linear red, green and blue, and alpha, at texture coordinates with v upwards:
+    /// (0, 0) is the lower left corner of the lower left pixel.
     ///
     /// As in Cycles (`svm_image_texture` of `kernel/svm/image.h`), sRGB values
     /// are decoded after they are interpolated.
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 4] {
-        let [width, height] = self.size();
-        // Only the place within one repetition counts; f64 keeps it exact far out.
-        let [u, v] = [0, 1].map(|axis| {
-            let place =
-                f64::from(uv[axis]) * f64::from(self.scale[axis]) + f64::from(self.offset[axis]);
-            // Coordinates that are none would make colours that are none.
-            if place.is_finite() {
-                place - place.floor()
-            } else {
-                0.0
-            }
-        });
-        let [x, y] = [u * width as f64, v * height as f64];
-        let mut value = match self.interpolation {
-            Interpolation::Closest => self.image.texel(x as usize, y as usize),
-            Interpolation::Bilinear => {
-                let (left, right, toward_right) = neighbours(x, width);
-                let (low, high, toward_high) = neighbours(y, height);
-                let low = mix(
-                    self.image.texel(left, low),
-                    self.image.texel(right, low),
-                    toward_right,
-                );
-                let high = mix(
-                    self.image.texel(left, high),
-                    self.image.texel(right, high),
-                    toward_right,
-                );
-                mix(low, high, toward_high)
+        let place = self.lookup.transform.apply(uv);
+        let mut value = match self.images.at(place) {
+            Some((image, place)) => self.interpolate(image, place),
+            None => MISSING,
+        };
+        self.finish(&mut value);
+        value
+    }
+
+    /// Values as stored.
+    fn interpolate(&self, image: &Image, place: [f64; 2]) -> [f32; 4] {
+        let Lookup {
+            extension, alpha, ..
+        } = self.lookup;
+        let [x, y] = [
+            extension.pixels(place[0], image.width),
+            extension.pixels(place[1], image.height),
+        ];
+        let texel = |x: i64, y: i64| {
+            let pixel = extension.pixel(x, image.width);
+            match (pixel, extension.pixel(y, image.height)) {
+                (Some(x), Some(y)) => image.texel(x, y, alpha.multiplies()),
+                _ => [0.0; 4],
             }
         };
-        if self.color_space == ColorSpace::Srgb {
-            for channel in &mut value[..3] {
+        let ((left, right_by), (low, up_by)) = (below(x), below(y));
+        match self.lookup.interpolation {
+            Interpolation::Closest => {
+                // Rounding may bring a place to the far edge of a repetition.
+                let last = |count: usize| match extension {
+                    Extension::Repeat => count as i64 - 1,
+                    _ => i64::MAX,
+                };
+                texel(
+                    (x.floor() as i64).min(last(image.width)),
+                    (y.floor() as i64).min(last(image.height)),
+                )
+            }
+            Interpolation::Bilinear => mix(
+                mix(texel(left, low), texel(left + 1, low), right_by),
+                mix(texel(left, low + 1), texel(left + 1, low + 1), right_by),
+                up_by,
+            ),
+            Interpolation::Cubic => {
+                let (across, up) = (b_spline(right_by), b_spline(up_by));
+                let mut sum = [0.0; 4];
+                for (y, up) in (low - 1..).zip(up) {
+                    for (x, across) in (left - 1..).zip(across) {
+                        for (sum, value) in sum.iter_mut().zip(texel(x, y)) {
+                            *sum += value * (across * up);
+                        }
+                    }
+                }
+                sum
+            }
+        }
+    }
+
+    /// From values as stored, interpolated, to linear ones.
+    fn finish(&self, value: &mut [f32; 4]) {
+        let alpha = value[3];
+        for channel in &mut value[..3] {
+            // As in Cycles, what has no alpha keeps its colour.
+            if self.lookup.alpha.divides() && alpha != 0.0 && alpha != 1.0 {
+                *channel /= alpha;
+            }
+            if self.lookup.color_space == ColorSpace::Srgb {
                 *channel = srgb_to_linear(*channel);
             }
         }
-        value
     }
 
     /// Linear red, green and blue, averaged over all pixels.
     pub fn mean(&self) -> [f32; 3] {
-        let [width, height] = self.size();
         let mut sum = [0.0f64; 3];
-        for y in 0..height {
-            for x in 0..width {
-                let texel = self.image.texel(x, y);
-                for (sum, &value) in sum.iter_mut().zip(&texel) {
-                    *sum += f64::from(match self.color_space {
-                        ColorSpace::Srgb => srgb_to_linear(value),
-                        ColorSpace::Linear | ColorSpace::NonColor => value,
-                    });
+        let mut count = 0;
+        for image in self.images.all() {
+            for y in 0..image.height {
+                for x in 0..image.width {
+                    let mut texel = image.texel(x, y, self.lookup.alpha.multiplies());
+                    self.finish(&mut texel);
+                    for (sum, &value) in sum.iter_mut().zip(&texel) {
+                        *sum += f64::from(value);
+                    }
                 }
             }
+            count += image.width * image.height;
         }
-        sum.map(|sum| (sum / (width * height).max(1) as f64) as f32)
+        sum.map(|sum| (sum / count.max(1) as f64) as f32)
     }
 
     /// One channel of [`Texture::sample`].
@@ -241,37 +249,62 @@ impl Image {
         }
     }
 
-    /// Red, green, blue and alpha as stored, `y` from the bottom. Rounding may
-    /// bring a place on the far edge, which is taken for the last pixel.
-    fn texel(&self, x: usize, y: usize) -> [f32; 4] {
-        let row = (self.height - 1).saturating_sub(y);
-        let pixel = row * self.width + x.min(self.width - 1);
-        let at = |channel: usize| {
-            let index = pixel * self.channels + channel;
-            match &self.texels {
-                Texels::U8(texels) => f32::from(texels[index]) / 255.0,
-                Texels::U16(texels) => f32::from(texels[index]) / 65535.0,
-                Texels::F16(texels) => texels[index].to_f32(),
-                Texels::F32(texels) => texels[index],
+    /// Red, green, blue and alpha as stored, `y` from the bottom; with `multiply` the
+    /// first three times the last, in whole numbers where pixels are, as in Cycles.
+    fn texel(&self, x: usize, y: usize, multiply: bool) -> [f32; 4] {
+        let pixel = ((self.height - 1 - y) * self.width + x) * self.channels;
+        let has_alpha = matches!(self.channels, 2 | 4);
+        let last = pixel + self.channels - 1;
+        let whole = |value: u32, alpha: u32, most: u32| {
+            let value = if multiply && has_alpha {
+                value * alpha / most
+            } else {
+                value
+            };
+            value as f32 / most as f32
+        };
+        let real = |value: f32, alpha: f32| {
+            if multiply && has_alpha {
+                value * alpha
+            } else {
+                value
             }
         };
+        let color = |channel: usize| {
+            let index = pixel + channel;
+            match &self.texels {
+                Texels::U8(texels) => whole(texels[index].into(), texels[last].into(), 255),
+                Texels::U16(texels) => whole(texels[index].into(), texels[last].into(), 65535),
+                Texels::F16(texels) => real(texels[index].to_f32(), texels[last].to_f32()),
+                Texels::F32(texels) => real(texels[index], texels[last]),
+            }
+        };
+        let alpha = || match &self.texels {
+            Texels::U8(texels) => f32::from(texels[last]) / 255.0,
+            Texels::U16(texels) => f32::from(texels[last]) / 65535.0,
+            Texels::F16(texels) => texels[last].to_f32(),
+            Texels::F32(texels) => texels[last],
+        };
         match self.channels {
-            1 => [at(0), at(0), at(0), 1.0],
-            2 => [at(0), at(0), at(0), at(1)],
-            3 => [at(0), at(1), at(2), 1.0],
-            _ => [at(0), at(1), at(2), at(3)],
+            1 | 2 => {
+                let grey = color(0);
+                [grey, grey, grey, if has_alpha { alpha() } else { 1.0 }]
+            }
+            3 => [color(0), color(1), color(2), 1.0],
+            _ => [color(0), color(1), color(2), alpha()],
         }
     }
 }
 
-/// The two pixels whose centres enclose a place along one side, and how far it
-/// is from the first to the second.
-fn neighbours(place: f64, count: usize) -> (usize, usize, f32) {
-    // From −1/2, which is half way to the last pixel of the repetition before.
+/// What Cycles shows where an image is missing: magenta.
+const MISSING: [f32; 4] = [1.0, 0.0, 1.0, 1.0];
+
+/// The pixel whose centre is the last before a place along one side, and how far it is
+/// from there to the next.
+fn below(place: f64) -> (i64, f32) {
     let from_centre = place - 0.5;
     let first = from_centre.floor();
-    let wrap = |index: f64| (index.max(-1.0) as isize).rem_euclid(count as isize) as usize;
-    (wrap(first), wrap(first + 1.0), (from_centre - first) as f32)
+    (first as i64, (from_centre - first) as f32)
 }
 
 fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {

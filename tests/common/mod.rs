@@ -1,12 +1,19 @@
 //! What several test files share: rendering scene files without the command.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use smithwalk::description::Description;
 use smithwalk::film::{Aov, Film};
 use smithwalk::image::{Image, Window};
 use smithwalk::integrator::{Control, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, resolve};
+
+/// A folder for the files of a test; what is in it may be there from before.
+pub fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
 
 /// A scene file with changes, read and built.
 pub fn load(path: &Path, overrides: &[(&str, &str)]) -> Resolved {

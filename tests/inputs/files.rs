@@ -4,17 +4,18 @@ use super::{assert_none, directory};
 use smithwalk::description::Description;
 use smithwalk::image::read_exr;
 use smithwalk::mesh::{Mesh, Wanted};
-use smithwalk::texture::{ColorSpace, Interpolation, Texture};
+use smithwalk::texture::{ColorSpace, Interpolation, Lookup, Texture};
 use std::path::Path;
 
 /// What is said of a path as a scene, as a mesh, as a texture, and as an image to compare.
 fn said(path: &Path) -> [String; 4] {
     let texture = Texture::load(
         path,
-        ColorSpace::Linear,
-        Interpolation::Closest,
-        [1.0; 2],
-        [0.0; 2],
+        Lookup {
+            color_space: ColorSpace::Linear,
+            interpolation: Interpolation::Closest,
+            ..Lookup::default()
+        },
     );
     [
         Description::load(path, &[])

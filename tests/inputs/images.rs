@@ -3,7 +3,7 @@
 use super::{assert_none, directory};
 use exr::prelude::*;
 use smithwalk::memory::Budget;
-use smithwalk::texture::{ColorSpace, Images, Interpolation, Texture};
+use smithwalk::texture::{ColorSpace, Images, Interpolation, Lookup, Texture, UvTransform};
 use std::path::Path;
 
 /// What becomes of a file.
@@ -21,7 +21,7 @@ fn load(path: &Path) -> std::result::Result<(Texture, Vec<String>), String> {
     let budget = Budget::new(1 << 30);
     let images = Images::new(&budget);
     images
-        .texture(path, ColorSpace::NonColor, Interpolation::Closest, [1.0; 2], [0.0; 2])
+        .texture(path, Lookup { color_space: ColorSpace::NonColor, interpolation: Interpolation::Closest, ..Lookup::default() })
         .map(|(texture, repairs)| (texture, repairs.iter().map(ToString::to_string).collect()))
         .map_err(|error| error.to_string())
 }
@@ -595,13 +595,13 @@ fn an_image_under_many_names_is_read_and_kept_once() {
         .map(|i| {
             let path = folder.join(names[i % 3]);
             let scale = [1.0 + i as f32; 2];
-            images.texture(&path, ColorSpace::Srgb, Interpolation::Closest, scale, [0.0; 2]).unwrap().0
+            images.texture(&path, Lookup { color_space: ColorSpace::Srgb, transform: UvTransform::from_parts(scale, 0.0, [0.0; 2]), ..Lookup::default() }).unwrap().0
         })
         .collect();
     assert_eq!(Texture::memory(&textures), 12);
     assert_eq!(budget.left(), 0);
     std::fs::write(folder.join("b"), png(2, 8, 2, &[], &[&[0; 6]])).unwrap();
-    let no_room = images.texture(&folder.join("b"), ColorSpace::Srgb, Interpolation::Closest, [1.0; 2], [0.0; 2]);
+    let no_room = images.texture(&folder.join("b"), Lookup { color_space: ColorSpace::Srgb, interpolation: Interpolation::Closest, ..Lookup::default() });
     let error = no_room.expect_err("the budget is spent").to_string();
     assert!(error.contains("left; --memory sets the limit"), "{error}");
 }

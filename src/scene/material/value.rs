@@ -38,7 +38,7 @@ impl<'a> Point<'a> {
     #[must_use]
     pub(super) fn nowhere() -> Self {
         Self {
-            textures: &[],
+            ground: Ground::default(),
             uv: Vec2::ZERO,
             cos: 1.0,
             front: true,
