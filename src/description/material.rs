@@ -596,7 +596,7 @@ impl Material {
             Self::Layered(part) => part.normal.as_ref(),
             Self::Principled(part) => part.normal.as_ref(),
             Self::OpenPbr(part) => part.normal.as_ref(),
-            Self::Emission(_) | Self::Transparent(_) | Self::Mix(_) | Self::Sum(_) => None,
+            _ => None,
         }
     }
 
