@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use smithwalk::description::Description;
-use smithwalk::image::OutputPath;
+use smithwalk::image::{Display, OutputPath};
 use smithwalk::integrator::{Control, render};
 use smithwalk::scene::{Resolved, resolve};
 
@@ -19,6 +19,7 @@ fn main() -> anyhow::Result<()> {
     } = resolve(&description)?;
     let mut film = settings.film();
     render(&scene, &settings, &mut film, Control::default())?;
-    OutputPath::new(image)?.write(&film.develop(), settings.exposure)?;
+    let display = Display::srgb(description.film.exposure);
+    OutputPath::new(image)?.write(&film.develop(), &display)?;
     Ok(())
 }

@@ -66,6 +66,15 @@ fn the_exporter_passes_its_tests() {
     }
 }
 
+/// PNG files look as Blender's own: within 1 of 255 on average, for every view transform
+/// that this Blender has.
+#[test]
+fn view_transforms_are_blenders() {
+    if blender_version().is_some() {
+        script(None, "test_view.py", &[env!("CARGO_BIN_EXE_smithwalk")]);
+    }
+}
+
 /// A failed export must not look like a success: `blender -b` itself exits with
 /// 0 after a Python exception.
 #[test]

@@ -108,6 +108,7 @@ fn what_is_left_out_has_the_documented_default() {
             height: 256,
             filter: Filter::Box {},
             exposure: 0.0,
+            view: None,
             aovs: vec![]
         }
     );

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use smithwalk::image::{Image, Layer, OutputPath, Window, read_exr};
+use smithwalk::image::{Display, Image, Layer, OutputPath, Window, read_exr};
 
 const FLOAT: &str = "tests/data/blender-float.exr";
 const HALF: &str = "tests/data/blender-half.exr";
@@ -40,7 +40,7 @@ struct File(PathBuf);
 impl File {
     fn new(name: &str, image: &Image) -> Self {
         let path = temporary(name);
-        OutputPath::new(&path).unwrap().write(image, 0.0).unwrap();
+        OutputPath::new(&path).unwrap().write(image, &Display::default()).unwrap();
         Self(path)
     }
 

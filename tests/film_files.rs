@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use smithwalk::film::{Aov, AovSet, Film, FilmError, Identity, Sample, SavedFilm, sidecar_path};
-use smithwalk::image::{OutputError, OutputPath, Window, read_exr};
+use smithwalk::image::{Display, OutputError, OutputPath, Window, read_exr};
 use smithwalk::sampler::{Dimension, Sampler};
 
 /// A folder of its own for each test, removed at the end.
@@ -90,7 +90,7 @@ fn an_exr_comes_back_bit_by_bit() {
     let path = folder.file("image.exr");
     let output = OutputPath::new(&path).unwrap();
     output.check().unwrap();
-    output.write(&image, 0.0).unwrap();
+    output.write(&image, &Display::default()).unwrap();
     let back = read_exr(&path).unwrap();
     assert_eq!(back.resolution, RESOLUTION);
     assert_eq!(back.window, CROP);
@@ -114,7 +114,10 @@ fn a_png_has_the_size_of_the_window() {
     let path = folder.file("image.PNG");
     let mut image = film().develop();
     image.color[0] = [1.0, 0.214_041_14, 0.0];
-    OutputPath::new(&path).unwrap().write(&image, 0.0).unwrap();
+    OutputPath::new(&path)
+        .unwrap()
+        .write(&image, &Display::default())
+        .unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let png = image::load_from_memory(&bytes).unwrap().into_rgb8();
     assert_eq!(png.dimensions(), (CROP.width, CROP.height));
@@ -295,12 +298,12 @@ fn a_failed_write_keeps_the_older_file() {
     let path = folder.file("image.exr");
     let output = OutputPath::new(&path).unwrap();
     let mut image = film().develop();
-    output.write(&image, 0.0).unwrap();
+    output.write(&image, &Display::default()).unwrap();
     let before = std::fs::read(&path).unwrap();
     // Two channels of one name: the encoder refuses.
     let twin = image.layers[0].clone();
     image.layers.push(twin);
-    let error = output.write(&image, 0.0).unwrap_err();
+    let error = output.write(&image, &Display::default()).unwrap_err();
     assert!(matches!(error, OutputError::Write { .. }), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert_eq!(folder.names(), ["image.exr"], "no leftovers");
@@ -320,14 +323,14 @@ fn temporary_files_follow_no_links_and_leave_nothing() {
     let output = OutputPath::new(folder.file("image.exr")).unwrap();
     output.check().unwrap();
     symlink(&victim, folder.file(".image.exr.part")).unwrap();
-    output.write(&image, 0.0).unwrap();
+    output.write(&image, &Display::default()).unwrap();
     assert_eq!(std::fs::read(&victim).unwrap(), b"precious");
 
     std::fs::create_dir(folder.file("real")).unwrap();
     std::fs::write(folder.file("real/there.exr"), "").unwrap();
     symlink(folder.file("real/there.exr"), folder.file("link.exr")).unwrap();
     let link = OutputPath::new(folder.file("link.exr")).unwrap();
-    link.write(&image, 0.0).unwrap();
+    link.write(&image, &Display::default()).unwrap();
     assert!(folder.file("link.exr").is_symlink());
     assert!(read_exr(&folder.file("real/there.exr")).unwrap().color == image.color);
 
@@ -340,7 +343,7 @@ fn temporary_files_follow_no_links_and_leave_nothing() {
     });
     let output = OutputPath::new(&pipe).unwrap();
     output.check().unwrap();
-    output.write(&image, 0.0).unwrap();
+    output.write(&image, &Display::default()).unwrap();
     assert!(reader.join().unwrap().starts_with(b"\x89PNG"));
     let kind = std::fs::symlink_metadata(&pipe).unwrap().file_type();
     assert!(kind.is_fifo());
@@ -362,7 +365,7 @@ fn files_that_are_no_images_give_errors() {
 
     OutputPath::new(&path)
         .unwrap()
-        .write(&film().develop(), 0.0)
+        .write(&film().develop(), &Display::default())
         .unwrap();
     let good = std::fs::read(&path).unwrap();
     for length in (0..good.len()).step_by(37) {

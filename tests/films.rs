@@ -144,6 +144,8 @@ fn resume_refuses_what_changes_samples_and_nothing_else() {
         room.write("scene.yaml", &SCENE.replace(from, to));
     };
     let room = Room::new("table");
+    let corners = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n";
+    room.write("view.cube", &format!("LUT_3D_SIZE 2\n{corners}"));
     room.render(&["-o", "a.exr", "--resume", "--spp", "2"]);
     let film = std::fs::read(room.file("a.exr.film")).unwrap();
     let restore = || {
@@ -154,10 +156,15 @@ fn resume_refuses_what_changes_samples_and_nothing_else() {
         std::fs::write(room.file("a.exr.film"), &film).unwrap();
     };
 
-    let goes_on: [(&str, &[&str], [&str; 2]); 5] = [
+    let goes_on: [(&str, &[&str], [&str; 2]); 6] = [
         ("nothing", &[], ["", ""]),
         ("more threads", &["--threads", "3"], ["", ""]),
         ("another exposure", &["-D", "film.exposure=2"], ["", ""]),
+        (
+            "another view",
+            &["-D", "film.view={lut: view.cube, log2: {offset: 1, min: 0, max: 4}}"],
+            ["", ""],
+        ),
         ("another object name", &[], ["name: square", "name: circle"]),
         ("another scene spp", &[], ["spp: 8", "spp: 80"]),
     ];

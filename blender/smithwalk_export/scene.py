@@ -11,7 +11,7 @@ import time
 
 import bpy
 
-from . import cycles, lights, settings, yaml
+from . import cycles, lights, settings, view, yaml
 from .audit import DEFAULTS, Audit
 from .bake import Baker
 from .files import Folder
@@ -143,10 +143,13 @@ class Job:
                               + ", ".join(f'"{l.name}"' for l in scene.view_layers))
         self.world = WorldWriter(scene, view_layer, Audit(), self.log, bake == BAKE, progress)
         self._sites = {}
+        self._view = None  # nodes of the view transform's table
 
     def prepare(self):
         """What takes renders of its own: defaults of all structs, the world, bakes."""
         DEFAULTS.prepare()
+        if not view.is_plain(self.scene):
+            self._view = view.table(self.scene)
         if self.bake == NO_BAKE:
             return
         self.world.prepare()
@@ -246,7 +249,7 @@ class Job:
             "light_units": lights.light_units(),
             "camera": lights.camera(scene, depsgraph, self.audit, log) if self.has_camera
             else lights.camera(_NoCamera, depsgraph, self.audit, log),
-            "film": settings.film(scene, log),
+            "film": settings.film(scene, log, None if self._view is None else view.section(self._view, files)),
             "sampling": settings.sampling(scene, depsgraph.view_layer),
             "world": world,
             "textures": self.materials.textures,

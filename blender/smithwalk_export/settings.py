@@ -1,5 +1,7 @@
 """The scene's settings: film, sampling, and what the renderer has no setting for."""
 
+from . import view
+
 # Settings whose default already is another picture than the renderer's: told
 # once, in short, while they have the default.
 _LIMITS = ("diffuse", "glossy", "transmission")
@@ -31,8 +33,8 @@ def resolution(render):
             max(render.resolution_y * render.resolution_percentage // 100, 1))
 
 
-def film(scene, log):
-    """The film section."""
+def film(scene, log, view_section=None):
+    """The film section; `view_section` is how PNGs look, where that is not plain sRGB."""
     render, cycles = scene.render, scene.cycles
     width, height = resolution(render)
     section = {"width": width, "height": height}
@@ -43,8 +45,10 @@ def film(scene, log):
         if kind != "BLACKMAN_HARRIS":
             log.warn("scene", f"pixel filter {kind.lower()} is written as Blackman-Harris")
         section["filter"] = {"blackman_harris": {"width": max(cycles.filter_width, 0.01)}}
-    if scene.view_settings.exposure != 0.0:
-        section["exposure"] = scene.view_settings.exposure
+    if view.exposure(scene) != 0.0:
+        section["exposure"] = view.exposure(scene)
+    if view_section:
+        section["view"] = view_section
     return section
 
 
@@ -88,8 +92,8 @@ def border(render):
 def tell(scene, view_layer, audit, log, composited, by_engine=False):
     """Name every setting that the scene file does not hold."""
     cycles, render = scene.cycles, scene.render
-    view = audit.view(scene)
-    view.accept(*_ACCEPTED)
+    seen = audit.view(scene)
+    seen.accept(*_ACCEPTED)
 
     general = []
     if cycles.sample_clamp_direct or cycles.sample_clamp_indirect:
@@ -114,21 +118,11 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
             log.warn("scene", f"bounce limits by kind are left out ({text}): {cycles.max_bounces} for all")
     if cycles.use_denoising:
         general.append("denoising")
-    view.accept("cycles.sample_clamp_direct", "cycles.sample_clamp_indirect", "cycles.blur_glossy",
+    seen.accept("cycles.sample_clamp_direct", "cycles.sample_clamp_indirect", "cycles.blur_glossy",
                 "cycles.max_bounces", *(f"cycles.{kind}_bounces" for kind in _LIMITS))
     if general:
         log.general("scene", "Cycles' " + ", ".join(general) + " have no counterpart")
 
-    if not by_engine:
-        view_settings = scene.view_settings
-        usual = view_settings.view_transform in {"Filmic", "AgX", "Standard"} and view_settings.look == "None" \
-            and view_settings.gamma == 1.0 and not view_settings.use_curve_mapping
-        grade = log.general if usual else log.warn
-        if view_settings.view_transform != "Standard" or not usual:
-            grade("scene", f"PNG files are plain sRGB: the view transform {view_settings.view_transform}"
-                           + ("" if view_settings.look == "None" else f", look {view_settings.look}")
-                           + ("" if view_settings.gamma == 1.0 else f", gamma {view_settings.gamma:g}")
-                           + " is not applied")
     for kind in ("reflective", "refractive"):
         if not getattr(cycles, f"caustics_{kind}"):
             log.warn("scene", f"{kind} caustics are off in Blender and are rendered here")
@@ -140,7 +134,7 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
         log.warn("scene", "motion blur is left out")
     if getattr(cycles, "use_fast_gi", False):
         log.warn("scene", "fast global illumination is left out: all bounces are traced")
-    view.accept("cycles.caustics_reflective", "cycles.caustics_refractive", "cycles.film_exposure",
+    seen.accept("cycles.caustics_reflective", "cycles.caustics_refractive", "cycles.film_exposure",
                 "render.film_transparent", "render.use_motion_blur", "cycles.use_fast_gi")
     if render.use_simplify and (cycles.use_camera_cull or getattr(cycles, "use_distance_cull", False)):
         log.warn("scene", "culling by camera or distance is left out: more objects than in Blender")

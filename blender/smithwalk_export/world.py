@@ -193,7 +193,7 @@ class WorldWriter:
     def _panorama(self, world, width):
         def aim(data):
             data.type = "PANO"
-            for owner in (data, data.cycles):
+            for owner in filter(None, (data, getattr(data, "cycles", None))):
                 if hasattr(owner, "panorama_type"):
                     owner.panorama_type = "EQUIRECTANGULAR"
         # Blender's environment lookup has +x in the middle, up is z.

@@ -9,7 +9,7 @@ use smithwalk::integrator::{KERNELS, kernel_for};
 use smithwalk::memory::{Bytes, resident};
 use smithwalk::scene::{RenderSettings, Scene};
 
-use super::scene::SceneArgs;
+use super::scene::{SceneArgs, display};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,6 +22,7 @@ pub struct Args {
 
 pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
     let description = args.scene.describe()?;
+    display(&description)?;
     let start = std::time::Instant::now();
     let scene = args.scene.resolve(&description, log)?.scene;
     let seconds = start.elapsed().as_secs_f64();

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{bail, ensure};
 use smithwalk::film::{Film, FilmError, SavedFilm, difference};
-use smithwalk::image::{OutputPath, check_output};
+use smithwalk::image::{Display, OutputPath, check_output};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,7 +21,7 @@ pub struct Args {
         value_name = "OUT.exr|OUT.png|OUT.film"
     )]
     output: Vec<PathBuf>,
-    /// Exposure of PNG files, in stops
+    /// Exposure of PNG files, in stops; they are plain sRGB
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
 }
@@ -62,7 +62,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         ("smithwalk.seed".to_owned(), known("seed")),
     ];
     for output in &images {
-        output.write(&image, args.exposure)?;
+        output.write(&image, &Display::srgb(args.exposure))?;
     }
     for path in &args.output {
         writeln!(out, "{}", path.display())?;

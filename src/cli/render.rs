@@ -16,12 +16,12 @@ use smithwalk::description::{Description, Estimator};
 use smithwalk::embree::Denoiser;
 use smithwalk::features::Features;
 use smithwalk::film::{Aov, Film, Identity, SavedFilm};
-use smithwalk::image::{DENOISED, Image, Layer, OutputPath, Window};
+use smithwalk::image::{DENOISED, Display, Image, Layer, OutputPath, Window};
 use smithwalk::integrator::{Checkpoint, Control, RenderReport, Stop, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene};
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::scene::SceneArgs;
+use super::scene::{SceneArgs, display};
 use outputs::Outputs;
 use progress::{ProgressKind, Reporter};
 use signals::Signals;
@@ -207,6 +207,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     }
     let mut description = args.scene.describe()?;
     apply(args, &mut description);
+    let display = display(&description)?;
     let outputs = Outputs::new(args, None)?;
     start_threads(args)?;
     let settings = override_settings(args, RenderSettings::new(&description))?;
@@ -219,6 +220,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         description: &description,
         outputs: &outputs,
         signals: &signals,
+        display: &display,
         frame: None,
     };
     let done = shot.take(&resolved, log)?;
@@ -242,6 +244,7 @@ struct Shot<'a> {
     description: &'a Description,
     outputs: &'a Outputs,
     signals: &'a Signals,
+    display: &'a Display,
     /// The number of the frame in an animation.
     frame: Option<i32>,
 }
@@ -268,6 +271,7 @@ impl Shot<'_> {
             description,
             outputs,
             signals,
+            display,
             frame,
         } = self;
         let Resolved {
@@ -325,7 +329,7 @@ impl Shot<'_> {
         // One that fails must not keep the others from being written.
         let mut write = |outputs: &[OutputPath], image: &Image| {
             for output in outputs {
-                if let Err(error) = output.write(image, settings.exposure) {
+                if let Err(error) = output.write(image, display) {
                     failed = Some(error.into());
                 }
             }

@@ -4,10 +4,21 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use smithwalk::description::{Description, Frame};
+use smithwalk::description::{Description, Frame, ViewTransform};
+use smithwalk::image::{Display, Lut};
 use smithwalk::memory::Budget;
 use smithwalk::scene::{RenderSettings, ResolveError, Resolved, Stage, resolve_within};
 use smithwalk::text::bounded;
+
+/// How the scene's PNG files look.
+pub fn display(description: &Description) -> anyhow::Result<Display> {
+    let film = &description.film;
+    let read = |view: &ViewTransform| Lut::read(&description.resolve_path(&view.lut), view.log2);
+    Ok(Display {
+        exposure: film.exposure,
+        lut: film.view.as_ref().map(read).transpose()?,
+    })
+}
 
 /// In bytes; longer warnings are cut.
 const MAX_WARNING: usize = 2000;

@@ -43,7 +43,7 @@ pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Ve
 pub use problem::{Problem, Problems};
 pub use relief::{NormalMap, NormalSpace};
 pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
-pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, World};
+pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, ViewTransform, World};
 pub use texture::{Placing, Texture};
 pub use transform::Transform;
 pub use value::{Color, Scalar};

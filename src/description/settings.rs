@@ -2,6 +2,7 @@
 
 use super::value;
 use crate::film::Aov;
+use crate::image::Log2;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -30,6 +31,8 @@ pub struct Film {
     pub filter: Filter,
     /// In stops; for PNG alone.
     pub exposure: f32,
+    /// How PNGs look; without it plain sRGB.
+    pub view: Option<ViewTransform>,
     /// Further images, each once.
     pub aovs: Vec<Aov>,
 }
@@ -41,9 +44,20 @@ impl Default for Film {
             height: 256,
             filter: Filter::Box {},
             exposure: 0.0,
+            view: None,
             aovs: Vec::new(),
         }
     }
+}
+
+/// From scene-linear light, after the exposure, to what a display shows.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewTransform {
+    /// A `.cube` file with a three-dimensional table, relative to the scene file.
+    pub lut: PathBuf,
+    /// Where in the table a value is.
+    pub log2: Log2,
 }
 
 /// A pixel filter, normalised to 1.

@@ -5,7 +5,8 @@ use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
-    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, World,
+    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, ViewTransform,
+    World,
 };
 use crate::text::excerpt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -366,6 +367,15 @@ impl Check<'_, '_> {
             Range::Within(-32.0, 32.0),
             at.key("exposure"),
         );
+        if let Some(ViewTransform { log2, .. }) = &film.view {
+            let at = at.key("view").key("log2");
+            self.number(log2.offset, Range::NonNegative, at.key("offset"));
+            if log2.min >= log2.max {
+                let (min, max) = (log2.min, log2.max);
+                let message = format!("expected more than min, {min}, found {max}");
+                self.report(at.key("max"), message);
+            }
+        }
         let mut seen = BTreeSet::new();
         for (index, aov) in film.aovs.iter().enumerate() {
             if !seen.insert(*aov) {

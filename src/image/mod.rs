@@ -3,13 +3,17 @@
 //! [`OutputPath`] writes an [`Image`] as EXR or PNG, [`read_exr`] reads one back.
 
 mod denoise;
+mod display;
 mod exr;
+mod lut;
 mod output;
 pub(crate) mod planes;
 mod window;
 
 pub use denoise::DENOISED;
+pub use display::Display;
 pub use exr::{ExrError, read_exr};
+pub use lut::{Log2, Lut, LutError};
 pub use output::{OutputError, OutputPath, check_output, replace};
 pub use window::Window;
 
@@ -86,17 +90,6 @@ impl Image {
         }
     }
 
-    /// The colour as 8-bit sRGB, row by row: scaled by 2^`exposure`, cut off at
-    /// white, encoded with the sRGB transfer function (IEC 61966-2-1). NaN
-    /// becomes black.
-    pub fn to_srgb8(&self, exposure: f32) -> Vec<u8> {
-        let scale = exposure.exp2();
-        // A cast turns NaN into 0.
-        let quantise = |c: f32| (srgb(c * scale) * 255.0 + 0.5) as u8;
-        let pixels = self.color.iter();
-        pixels.flat_map(|color| color.map(quantise)).collect()
-    }
-
     /// The value of an attribute.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         let found = self.attributes.iter().find(|(n, _)| n == name);
@@ -130,40 +123,5 @@ impl Layer {
         let [a, b, c] = channels.map(|name| self.channel(name));
         let (a, b, c) = (a?, b?, c?);
         Some((0..a.len()).map(|i| [a[i], b[i], c[i]]).collect())
-    }
-}
-
-/// The sRGB transfer function: linear in, encoded out, both in [0, 1].
-fn srgb(linear: f32) -> f32 {
-    let linear = linear.clamp(0.0, 1.0);
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Values from the definition: mid grey 0.214041 is code 127.5 / 255; 0.18
-    /// is 0.461356.
-    #[test]
-    fn transfer_function_has_known_values() {
-        assert!((srgb(0.214_041) - 0.5).abs() < 1e-5);
-        assert!((srgb(0.18) - 0.461_356).abs() < 1e-5);
-        assert!((srgb(0.003_130_8) - 0.040_45).abs() < 1e-5);
-        assert!((srgb(1.0) - 1.0).abs() < 1e-6);
-        assert_eq!(srgb(7.0), srgb(1.0));
-        assert_eq!(srgb(-1.0), 0.0);
-    }
-
-    #[test]
-    fn exposure_counts_in_stops() {
-        let mut image = Image::black([1, 1], Window::full([1, 1]));
-        image.color[0] = [0.25, 0.5, f32::NAN];
-        assert_eq!(image.to_srgb8(1.0), [188, 255, 0]);
-        assert_eq!(image.to_srgb8(2.0), [255, 255, 0]);
     }
 }

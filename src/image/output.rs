@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Image, exr};
+use super::{Display, Image, exr};
 
 /// Why an image can't be written.
 #[derive(Debug, thiserror::Error)]
@@ -88,12 +88,12 @@ impl OutputPath {
     }
 
     /// Writes the image: scene-linear with all layers and attributes as EXR;
-    /// the colour alone as sRGB, scaled by 2^`exposure`, as PNG. The file is
-    /// replaced once the new one is complete.
+    /// the colour alone, as `display` shows it, as PNG. The file is replaced once the
+    /// new one is complete.
     ///
     /// # Errors
     /// When the system refuses; a file that was there before stays.
-    pub fn write(&self, image: &Image, exposure: f32) -> Result<(), OutputError> {
+    pub fn write(&self, image: &Image, display: &Display) -> Result<(), OutputError> {
         match self.format {
             Format::Exr => {
                 let mut bytes = Cursor::new(Vec::new());
@@ -103,7 +103,7 @@ impl OutputPath {
             }
             Format::Png => {
                 let size = [image.window.width, image.window.height];
-                self.write_rgb8(&image.to_srgb8(exposure), size)
+                self.write_rgb8(&display.encode(image), size)
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What a person sees of a difference.
 
-use crate::image::Image;
+use crate::image::{Display, Image};
 
 /// Mean of the ꟻLIP error map (Andersson et al. 2020, "FLIP: A Difference
 /// Evaluator for Alternating Images", Proc. ACM CGIT 3(2)), between 0 (nobody
@@ -17,7 +17,7 @@ pub fn flip(a: &Image, b: &Image, exposure: f32) -> f32 {
     assert_eq!(size(a), size(b), "images of different size");
     let [width, height] = size(a);
     let convert = |image: &Image| {
-        let pixels = image.to_srgb8(exposure);
+        let pixels = Display::srgb(exposure).encode(image);
         nv_flip::FlipImageRgb8::with_data(width, height, &pixels)
     };
     let errors = nv_flip::flip(convert(b), convert(a), nv_flip::DEFAULT_PIXELS_PER_DEGREE);

@@ -14,8 +14,8 @@ use crate::mesh::Mesh as Triangles;
 use crate::texture;
 
 /// Names what decides about the samples of a render, each with a hash or a short value.
-/// Where files lie, what objects are called, the number of samples and the exposure of
-/// PNGs do not take part; what does by its name (meshes, materials, textures) is taken
+/// Where files lie, what objects are called, the number of samples, exposure and view
+/// transform of PNGs do not take part; what does by its name (meshes, materials, textures) is taken
 /// as referred to.
 ///
 /// XXH3 is fast enough for gigabytes of textures, its results are specified to stay,
@@ -47,6 +47,7 @@ pub(super) fn identity(
         height,
         filter,
         exposure: _,
+        view: _,
         aovs: _,
     } = film;
     let Sampling {

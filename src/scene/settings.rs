@@ -49,8 +49,6 @@ pub struct RenderSettings {
     pub share: Range<u32>,
     /// When to stop.
     pub limits: Limits,
-    /// In stops; for PNG alone.
-    pub exposure: f32,
     /// Surface interactions after the first.
     pub max_bounces: u32,
     /// Russian roulette starts at this bounce.
@@ -80,7 +78,6 @@ impl RenderSettings {
             seed: sampling.seed,
             share: 0..u32::MAX,
             limits: Limits::samples(sampling.spp),
-            exposure: film.exposure,
             max_bounces: sampling.max_bounces,
             roulette_start: sampling.roulette_start,
             branches: sampling.branches,

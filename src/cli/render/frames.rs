@@ -9,6 +9,7 @@ use anyhow::ensure;
 use smithwalk::description::{Animation, Frame};
 use smithwalk::scene::{RenderSettings, Stage};
 
+use super::super::scene::display;
 use super::outputs::Outputs;
 use super::signals::Signals;
 use super::{Args, FrameRange, Shot, apply, complete_mark, override_settings, start_threads};
@@ -30,6 +31,7 @@ pub fn run(
         let frame = describe(number)?;
         Outputs::new(args, Some(number))?;
         check_meshes(&frame, number)?;
+        display(&frame.description)?;
     }
     start_threads(args)?;
     let mut stage = Stage::new(animation.camera());
@@ -50,6 +52,7 @@ pub fn run(
             break;
         }
         let outputs = Outputs::new(args, Some(number))?;
+        let display = display(description)?;
         let mark = complete_mark(&resolved.identity, description, &settings);
         if args.resume && outputs.are_complete(&mark) {
             printed = printed.and(line(out, format_args!("frame {number} is complete")));
@@ -60,6 +63,7 @@ pub fn run(
                 description,
                 outputs: &outputs,
                 signals,
+                display: &display,
                 frame: Some(number),
             };
             let done = shot.take(&resolved, log)?;

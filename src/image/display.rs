@@ -1,0 +1,76 @@
+//! From scene-linear light to what a display shows.
+
+use super::{Image, Lut};
+
+/// How images become 8-bit colours.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Display {
+    /// In stops: light is scaled by 2^exposure first.
+    pub exposure: f32,
+    /// The view transform; without one the sRGB transfer function (IEC 61966-2-1), cut
+    /// off at white.
+    pub lut: Option<Lut>,
+}
+
+impl Display {
+    /// Plain sRGB, at an exposure in stops.
+    #[must_use]
+    pub fn srgb(exposure: f32) -> Self {
+        Self {
+            exposure,
+            lut: None,
+        }
+    }
+
+    /// The image's colour in 8 bits, row by row. NaN becomes black.
+    #[must_use]
+    pub fn encode(&self, image: &Image) -> Vec<u8> {
+        let scale = self.exposure.exp2();
+        let pixels = image.color.iter().flat_map(|color| {
+            let scaled = color.map(|c| c * scale);
+            let shown = match &self.lut {
+                Some(lut) => lut.look_up(scaled),
+                None => scaled.map(srgb),
+            };
+            // A cast turns NaN into 0.
+            shown.map(|c| (c * 255.0 + 0.5) as u8)
+        });
+        pixels.collect()
+    }
+}
+
+/// The sRGB transfer function: linear in, encoded out, both in [0, 1].
+fn srgb(linear: f32) -> f32 {
+    let linear = linear.clamp(0.0, 1.0);
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Window;
+
+    /// Values from the definition: mid grey 0.214041 is code 127.5 / 255; 0.18
+    /// is 0.461356.
+    #[test]
+    fn transfer_function_has_known_values() {
+        assert!((srgb(0.214_041) - 0.5).abs() < 1e-5);
+        assert!((srgb(0.18) - 0.461_356).abs() < 1e-5);
+        assert!((srgb(0.003_130_8) - 0.040_45).abs() < 1e-5);
+        assert!((srgb(1.0) - 1.0).abs() < 1e-6);
+        assert_eq!(srgb(7.0), srgb(1.0));
+        assert_eq!(srgb(-1.0), 0.0);
+    }
+
+    #[test]
+    fn exposure_counts_in_stops() {
+        let mut image = Image::black([1, 1], Window::full([1, 1]));
+        image.color[0] = [0.25, 0.5, f32::NAN];
+        assert_eq!(Display::srgb(1.0).encode(&image), [188, 255, 0]);
+        assert_eq!(Display::srgb(2.0).encode(&image), [255, 255, 0]);
+    }
+}
