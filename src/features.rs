@@ -44,8 +44,8 @@ features! {
     INSTANCES = 11, "instances", "a second level in the hierarchy, a transform per hit";
     /// Interpolated normals.
     SMOOTH_NORMALS = 12, "smooth normals", "normals in memory, an interpolation per hit";
-    /// Objects that camera rays pass.
-    HIDDEN_OBJECTS = 13, "objects hidden from the camera", "a test per camera ray";
+    /// Objects, lights or a world that some kinds of rays pass.
+    RAY_VISIBILITY = 13, "ray visibility", "a mask per ray, the kind of every scattered one";
     /// Conductor closures, mirrors among them.
     METALS = 14, "metals", "conductor closures in the kernel";
     /// Microsurfaces of Lambertian facets.

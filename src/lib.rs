@@ -28,6 +28,7 @@ pub mod memory;
 pub mod mesh;
 pub mod metrics;
 pub mod numbered;
+pub mod rays;
 pub mod report;
 pub mod sampler;
 pub mod scene;

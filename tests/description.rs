@@ -58,6 +58,7 @@ fn the_documented_example_says_what_it_seems_to() {
     assert_eq!(
         scene.world,
         Some(World::Constant {
+            hidden_from: Vec::new(),
             color: [0.5, 0.6, 0.8],
             strength: 0.5
         })

@@ -40,7 +40,10 @@ struct File(PathBuf);
 impl File {
     fn new(name: &str, image: &Image) -> Self {
         let path = temporary(name);
-        OutputPath::new(&path).unwrap().write(image, &Display::default()).unwrap();
+        OutputPath::new(&path)
+            .unwrap()
+            .write(image, &Display::default())
+            .unwrap();
         Self(path)
     }
 

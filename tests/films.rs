@@ -162,7 +162,10 @@ fn resume_refuses_what_changes_samples_and_nothing_else() {
         ("another exposure", &["-D", "film.exposure=2"], ["", ""]),
         (
             "another view",
-            &["-D", "film.view={lut: view.cube, log2: {offset: 1, min: 0, max: 4}}"],
+            &[
+                "-D",
+                "film.view={lut: view.cube, log2: {offset: 1, min: 0, max: 4}}",
+            ],
             ["", ""],
         ),
         ("another object name", &[], ["name: square", "name: circle"]),

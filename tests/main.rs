@@ -31,3 +31,4 @@ mod shading_normals;
 mod tables;
 mod textures;
 mod validate;
+mod visibility;

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::color::Rgb;
 use crate::features::{Features, has};
+use crate::rays::RayKind;
 use smithwalk_model::{self as model, Beckmann, Conductor, Draw, Ggx, Tally};
 
 /// Everything that a surface can scatter with.
@@ -62,6 +63,17 @@ impl Closure {
             Self::Mirror(_) | Self::Interface(_) | Self::Transparent(_) => true,
             Self::Layered(stack) => stack.is_delta(),
             Self::Lambert(_) | Self::Rough(_) | Self::Diffuser(_) => false,
+        }
+    }
+
+    /// The kind of ray that a direction with this cosine is.
+    #[inline(always)]
+    pub(super) fn kind(&self, cos: f32) -> RayKind {
+        match self {
+            _ if cos < 0.0 => RayKind::Transmission,
+            Self::Lambert(_) | Self::Diffuser(_) => RayKind::Diffuse,
+            Self::Rough(rough) if rough.has_diffuse_facets() => RayKind::Diffuse,
+            _ => RayKind::Glossy,
         }
     }
 

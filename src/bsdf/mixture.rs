@@ -9,6 +9,7 @@ use super::horizons::Horizons;
 use super::{ByOrder, Closure, Frame};
 use crate::color::Rgb;
 use crate::features::{Features, has};
+use crate::rays::{RayKind, RayKinds};
 use smithwalk_model::{self as model, Draw, LANES, Tally};
 
 /// The most closures that a material may flatten to.
@@ -42,6 +43,8 @@ pub struct ScatterSample {
     pub delta: bool,
     /// Whether the direction is the straight continuation of the ray.
     pub straight: bool,
+    /// What the ray that goes on is seen as.
+    pub kind: RayKind,
 }
 
 /// All closures at a hit, with the geometric normal that tells reflection from
@@ -119,6 +122,7 @@ impl<const F: u32> Bsdf<F> {
             order: sample.order,
             delta: sample.delta,
             straight: matches!(part.closure, Closure::Transparent(_)),
+            kind: part.closure.kind(sample.wi.z),
         })
     }
 
@@ -131,6 +135,21 @@ impl<const F: u32> Bsdf<F> {
         sum
     }
 
+    /// As [`Self::eval`], of the closures alone whose rays are of one of these kinds.
+    #[must_use]
+    #[inline]
+    pub fn eval_seen_by(
+        &self,
+        kinds: RayKinds,
+        wo: Vec3,
+        wi: Vec3,
+        rng: &mut impl Draw<f32>,
+    ) -> ByOrder {
+        let mut sum = ByOrder::ZERO;
+        self.tally(kinds, wo, wi, rng, &mut sum);
+        sum
+    }
+
     /// Adds f·|cosθ_i| or an estimate of it, sr⁻¹, to `tally`, order by order.
     #[inline]
     pub fn eval_orders(
@@ -140,10 +159,25 @@ impl<const F: u32> Bsdf<F> {
         rng: &mut impl Draw<f32>,
         tally: &mut impl Tally<f32>,
     ) {
+        self.tally(RayKinds::ALL, wo, wi, rng, tally);
+    }
+
+    #[inline(always)]
+    fn tally(
+        &self,
+        kinds: RayKinds,
+        wo: Vec3,
+        wi: Vec3,
+        rng: &mut impl Draw<f32>,
+        tally: &mut impl Tally<f32>,
+    ) {
         for part in self.known() {
             let Some(Seen { wo, wi, density }) = part.see(self.normal, wo, wi) else {
                 continue;
             };
+            if has::<F>(Features::RAY_VISIBILITY) && !kinds.contains(part.closure.kind(wi.z)) {
+                continue;
+            }
             let weight = if has::<F>(Features::MIXES) {
                 part.weight * density
             } else {
@@ -290,6 +324,7 @@ impl<const F: u32> InLanes<'_, F> {
                 order: sample.order,
                 delta: false,
                 straight: false,
+                kind: RayKind::Glossy,
             };
             lit.then_some((sample, pdf * density))
         })

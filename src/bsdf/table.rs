@@ -107,6 +107,14 @@ macro_rules! distributions {
                 }
             }
 
+            /// Whether its facets are diffuse: its light is, too.
+            #[inline(always)]
+            pub(super) fn has_diffuse_facets(&self) -> bool {
+                match self {
+                    $(Self::$ndf(by) => matches!(by, ByFacets::Diffuse(_)),)*
+                }
+            }
+
             #[inline(always)]
             pub(super) fn is_in<const F: u32>(&self) -> bool {
                 match self {

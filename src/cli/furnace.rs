@@ -100,6 +100,7 @@ fn scene(
         description.sampling.estimator = estimator.into();
     }
     description.world = Some(World::Constant {
+        hidden_from: Vec::new(),
         color: [1.0; 3],
         strength: 1.0,
     });

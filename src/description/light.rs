@@ -2,6 +2,7 @@
 
 use super::transform::Transform;
 use super::value;
+use crate::rays::{RayKind, RayKinds};
 use serde::Deserialize;
 
 /// A light that shines along its local −z, or all round.
@@ -18,8 +19,26 @@ pub struct Light {
     pub exposure: f32,
     /// Whether camera rays see the light.
     pub visible_to_camera: bool,
+    /// Of diffuse, glossy and transmission: the rays that pass it, and the scattering
+    /// that its light is left out of.
+    pub hidden_from: Vec<RayKind>,
     /// The shape and the power.
     pub kind: LightKind,
+}
+
+impl Light {
+    /// The rays that meet it.
+    #[must_use]
+    pub fn seen_by(&self) -> RayKinds {
+        seen_by(self.visible_to_camera, &self.hidden_from)
+    }
+}
+
+/// All rays but those from the camera, if it does not see the thing, and those that it is
+/// hidden from.
+pub(super) fn seen_by(camera: bool, hidden: &[RayKind]) -> RayKinds {
+    let camera = (!camera).then_some(RayKind::Camera);
+    RayKinds::all_but(hidden.iter().copied().chain(camera))
 }
 
 /// The shape and the power of a light.
@@ -109,13 +128,20 @@ macro_rules! raw_lights {
                 exposure: f32,
                 #[serde(default)]
                 visible_to_camera: bool,
+                #[serde(default)]
+                hidden_from: Vec<RayKind>,
                 $($(#[$attribute])* $key: $type,)*
             }
 
             impl From<$raw> for Light {
                 fn from(raw: $raw) -> Self {
-                    let $raw { name, transform, color, exposure, visible_to_camera, $($key),* } = raw;
-                    Self { name, transform, color, exposure, visible_to_camera, kind: $kind }
+                    let $raw {
+                        name, transform, color, exposure, visible_to_camera, hidden_from, $($key),*
+                    } = raw;
+                    Self {
+                        name, transform, color, exposure, visible_to_camera, hidden_from,
+                        kind: $kind,
+                    }
                 }
             }
         )*

@@ -55,6 +55,7 @@ use problem::Sources;
 
 use crate::memory::Budget;
 use crate::numbered::Numbered;
+use crate::rays::{RayKind, RayKinds};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -274,6 +275,16 @@ pub struct Object {
     pub transform: Transform,
     /// Whether camera rays see the object.
     pub visible_to_camera: bool,
+    /// Other rays that pass it.
+    pub hidden_from: Vec<RayKind>,
+}
+
+impl Object {
+    /// The rays that meet it.
+    #[must_use]
+    pub fn seen_by(&self) -> RayKinds {
+        light::seen_by(self.visible_to_camera, &self.hidden_from)
+    }
 }
 
 /// Which faces of an object get which material.
@@ -298,6 +309,8 @@ struct RawObject {
     transform: Transform,
     #[serde(default = "value::yes")]
     visible_to_camera: bool,
+    #[serde(default)]
+    hidden_from: Vec<RayKind>,
 }
 
 impl TryFrom<RawObject> for Object {
@@ -316,6 +329,7 @@ impl TryFrom<RawObject> for Object {
             materials,
             transform: raw.transform,
             visible_to_camera: raw.visible_to_camera,
+            hidden_from: raw.hidden_from,
         })
     }
 }

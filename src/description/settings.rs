@@ -3,6 +3,7 @@
 use super::value;
 use crate::film::Aov;
 use crate::image::Log2;
+use crate::rays::{RayKind, RayKinds};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -148,6 +149,9 @@ pub enum World {
         /// The factor that makes `color` a radiance in W·m⁻²·sr⁻¹.
         #[serde(default = "value::one")]
         strength: f32,
+        /// Rays that see black instead.
+        #[serde(default)]
+        hidden_from: Vec<RayKind>,
     },
     /// An equirectangular image.
     Environment {
@@ -163,5 +167,17 @@ pub enum World {
         /// directions before the image is looked up.
         #[serde(default)]
         rotation: [f32; 3],
+        /// Rays that see black instead.
+        #[serde(default)]
+        hidden_from: Vec<RayKind>,
     },
+}
+
+impl World {
+    /// The rays that see it.
+    #[must_use]
+    pub fn seen_by(&self) -> RayKinds {
+        let (Self::Constant { hidden_from, .. } | Self::Environment { hidden_from, .. }) = self;
+        RayKinds::all_but(hidden_from.iter().copied())
+    }
 }

@@ -8,11 +8,18 @@ use super::{
     Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, ViewTransform,
     World,
 };
+use crate::rays::RayKind;
 use crate::text::excerpt;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// In pixels. More would need over 10 GB for the sums alone.
 const MAX_SIDE: u32 = 32_768;
+
+/// Why the camera is not among what things are hidden from.
+const CAMERA: (RayKind, &str) = (
+    RayKind::Camera,
+    "for the camera there is the key `visible_to_camera`",
+);
 
 /// Checks a description against the tree it came from; gives
 /// [`Description::perturbed`].
@@ -405,13 +412,18 @@ impl Check<'_, '_> {
 
     fn world(&mut self, world: &World, at: At) {
         let (kind, color, strength) = match world {
-            World::Constant { color, strength } => ("constant", *color, *strength),
+            World::Constant {
+                color, strength, ..
+            } => ("constant", *color, *strength),
             World::Environment {
                 color, strength, ..
             } => ("environment", *color, *strength),
         };
         self.triple(color, Range::NonNegative, at.key(kind).key("color"));
         self.number(strength, Range::NonNegative, at.key(kind).key("strength"));
+        let (World::Constant { hidden_from, .. } | World::Environment { hidden_from, .. }) = world;
+        let refused = [(RayKind::Shadow, "shadow rays never meet the world")];
+        self.hidden_from(hidden_from, &refused, at.key(kind));
     }
 
     /// Mixes that contain themselves.
@@ -421,7 +433,17 @@ impl Check<'_, '_> {
         }
     }
 
+    /// Kinds of rays that make no sense there, each with why.
+    fn hidden_from(&mut self, hidden: &[RayKind], refused: &[(RayKind, &str)], at: At) {
+        for (index, kind) in hidden.iter().enumerate() {
+            if let Some((_, why)) = refused.iter().find(|(refused, _)| refused == kind) {
+                self.report(at.key("hidden_from").index(index), (*why).to_owned());
+            }
+        }
+    }
+
     fn object(&mut self, object: &Object, at: At) {
+        self.hidden_from(&object.hidden_from, &[CAMERA], at.clone());
         self.reference("meshes", "mesh", &object.mesh, at.key("mesh"));
         self.transform(&object.transform, Use::Surface, at.key("transform"));
         match &object.materials {
@@ -486,6 +508,8 @@ impl Check<'_, '_> {
             LightKind::Area { .. } => Use::Surface,
             _ => Use::Direction,
         };
+        let refused = [CAMERA, (RayKind::Shadow, "shadow rays end at lights")];
+        self.hidden_from(&light.hidden_from, &refused, at.clone());
         self.transform(&light.transform, usage, at.key("transform"));
         self.triple(light.color, Range::NonNegative, at.key("color"));
         self.number(

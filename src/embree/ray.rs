@@ -29,7 +29,7 @@ impl Ray {
         }
     }
 
-    pub(super) fn to_embree(self) -> sys::RTCRay {
+    pub(super) fn to_embree(self, mask: u32) -> sys::RTCRay {
         sys::RTCRay {
             org_x: self.origin.x,
             org_y: self.origin.y,
@@ -39,6 +39,7 @@ impl Ray {
             dir_y: self.direction.y,
             dir_z: self.direction.z,
             tfar: self.t_far,
+            mask,
             ..sys::RTCRay::default()
         }
     }
@@ -70,9 +71,9 @@ pub(super) struct PaddedRayHit {
 }
 
 impl PaddedRayHit {
-    pub(super) fn new(ray: Ray) -> Self {
+    pub(super) fn new(ray: Ray, mask: u32) -> Self {
         Self {
-            ray: ray.to_embree(),
+            ray: ray.to_embree(mask),
             hit: sys::RTCHit::default(),
             pad: [CANARY; 4],
         }

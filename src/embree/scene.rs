@@ -8,6 +8,7 @@ use glam::Affine3A;
 
 use super::device::{Device, EmbreeError};
 use super::ray::{Hit, PaddedRayHit, Ray};
+use crate::rays::{RayKind, RayKinds};
 
 /// Vertex positions, in metres, laid out so that Embree can read them in place.
 ///
@@ -42,6 +43,8 @@ pub enum Geometry {
         vertices: Arc<Vertices>,
         /// Three vertex indices for each triangle.
         triangles: Arc<Vec<[u32; 3]>>,
+        /// The rays that meet it.
+        seen_by: RayKinds,
     },
     /// Another placing of triangles that several geometries share.
     Instance {
@@ -49,6 +52,8 @@ pub enum Geometry {
         shared: usize,
         /// Object space to world space.
         to_world: Affine3A,
+        /// The rays that meet it.
+        seen_by: RayKinds,
     },
 }
 
@@ -117,7 +122,7 @@ impl Structure {
     /// # Errors
     /// As [`Accelerator::build`].
     pub fn of_mesh(device: &Arc<Device>, mesh: &SharedMesh) -> Result<Self, EmbreeError> {
-        Self::build(device, [(0, mesh.clone())])
+        Self::build(device, [(0, mesh.clone(), RayKinds::ALL)])
     }
 
     /// Builds one structure over all of the geometries that are meshes; they keep
@@ -133,7 +138,11 @@ impl Structure {
                 Geometry::Mesh {
                     vertices,
                     triangles,
-                } => Some((id, (Arc::clone(vertices), Arc::clone(triangles)))),
+                    seen_by,
+                } => {
+                    let mesh = (Arc::clone(vertices), Arc::clone(triangles));
+                    Some((id, mesh, *seen_by))
+                }
                 Geometry::Instance { .. } => None,
             }),
         )
@@ -141,12 +150,12 @@ impl Structure {
 
     fn build(
         device: &Arc<Device>,
-        meshes: impl IntoIterator<Item = (u32, SharedMesh)>,
+        meshes: impl IntoIterator<Item = (u32, SharedMesh, RayKinds)>,
     ) -> Result<Self, EmbreeError> {
         let scene = RawScene::new(device)?;
         let mut buffers = Vec::new();
-        for (id, (vertices, triangles)) in meshes {
-            scene.attach(new_mesh(device, &vertices, &triangles)?, id);
+        for (id, (vertices, triangles), seen_by) in meshes {
+            scene.attach(new_mesh(device, &vertices, &triangles, seen_by)?, id);
             buffers.push((vertices, triangles));
         }
         scene.commit(device)?;
@@ -220,19 +229,21 @@ impl Accelerator {
                 Geometry::Mesh {
                     vertices,
                     triangles,
+                    seen_by,
                 } => {
                     buffers.push((Arc::clone(vertices), Arc::clone(triangles)));
-                    new_mesh(&device, vertices, triangles)?
+                    new_mesh(&device, vertices, triangles, *seen_by)?
                 }
                 Geometry::Instance {
                     shared: index,
                     to_world,
+                    seen_by,
                 } => {
                     let child = shared.get(*index).ok_or(EmbreeError::NoSuchMesh {
                         index: *index,
                         meshes: shared.len(),
                     })?;
-                    new_instance(&device, &child.scene, to_world)
+                    new_instance(&device, &child.scene, to_world, *seen_by)
                 }
             };
             root.attach(raw, id);
@@ -240,7 +251,7 @@ impl Accelerator {
         let mut number = sys::RTC_INVALID_GEOMETRY_ID;
         if let Some(still) = still {
             number = geometries.len() as u32;
-            let instance = new_instance(&device, &still.scene, &Affine3A::IDENTITY);
+            let instance = new_instance(&device, &still.scene, &Affine3A::IDENTITY, RayKinds::ALL);
             root.attach(instance, number);
             shared.push(still);
         }
@@ -265,9 +276,21 @@ impl Accelerator {
     #[must_use]
     #[inline]
     pub fn intersect(&self, ray: Ray) -> Option<Hit> {
+        self.nearest(ray, u32::MAX)
+    }
+
+    /// The nearest hit of what rays of this kind meet.
+    #[must_use]
+    #[inline]
+    pub fn intersect_as(&self, kind: RayKind, ray: Ray) -> Option<Hit> {
+        self.nearest(ray, kind.mask())
+    }
+
+    #[inline]
+    fn nearest(&self, ray: Ray, mask: u32) -> Option<Hit> {
         #[cfg(feature = "record-rays")]
         super::record::note(super::Query::Intersect(ray));
-        let hit = self.query(ray);
+        let hit = self.query(ray, mask);
         if hit.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
             return None;
         }
@@ -288,8 +311,8 @@ impl Accelerator {
         })
     }
 
-    fn query(&self, ray: Ray) -> PaddedRayHit {
-        let mut record = PaddedRayHit::new(ray);
+    fn query(&self, ray: Ray, mask: u32) -> PaddedRayHit {
+        let mut record = PaddedRayHit::new(ray, mask);
         // SAFETY: the record begins like an RTCRayHit, is aligned to 16 bytes and
         // has room for the fields that newer libraries write behind it; the
         // scene is committed; null arguments mean the defaults.
@@ -303,9 +326,21 @@ impl Accelerator {
     #[must_use]
     #[inline]
     pub fn occluded(&self, ray: Ray) -> bool {
+        self.blocked(ray, u32::MAX)
+    }
+
+    /// Whether anything that rays of this kind meet lies on `ray`'s segment.
+    #[must_use]
+    #[inline]
+    pub fn occluded_as(&self, kind: RayKind, ray: Ray) -> bool {
+        self.blocked(ray, kind.mask())
+    }
+
+    #[inline]
+    fn blocked(&self, ray: Ray, mask: u32) -> bool {
         #[cfg(feature = "record-rays")]
         super::record::note(super::Query::Occluded(ray));
-        let mut record = ray.to_embree();
+        let mut record = ray.to_embree(mask);
         // SAFETY: RTCRay has the library's size and alignment (repr(C, align(16))
         // in the bindings); the scene is committed; null means the defaults.
         unsafe { sys::rtcOccluded1(self.root.0, &raw mut record, std::ptr::null_mut()) };
@@ -338,6 +373,7 @@ fn new_mesh(
     device: &Device,
     vertices: &Vertices,
     triangles: &[[u32; 3]],
+    seen_by: RayKinds,
 ) -> Result<sys::RTCGeometry, EmbreeError> {
     let count = vertices.len();
     for (triangle, corners) in triangles.iter().enumerate() {
@@ -374,13 +410,19 @@ fn new_mesh(
             size_of::<[u32; 3]>(),
             triangles.len(),
         );
+        sys::rtcSetGeometryMask(geometry, seen_by.mask());
         geometry
     };
     device.check()?;
     Ok(geometry)
 }
 
-fn new_instance(device: &Device, child: &RawScene, to_world: &Affine3A) -> sys::RTCGeometry {
+fn new_instance(
+    device: &Device,
+    child: &RawScene,
+    to_world: &Affine3A,
+    seen_by: RayKinds,
+) -> sys::RTCGeometry {
     let columns = to_world.to_cols_array();
     // SAFETY: device and child scene are valid, and Embree copies the matrix.
     unsafe {
@@ -392,6 +434,7 @@ fn new_instance(device: &Device, child: &RawScene, to_world: &Affine3A) -> sys::
             sys::RTCFormat::FLOAT3X4_COLUMN_MAJOR,
             columns.as_ptr().cast(),
         );
+        sys::rtcSetGeometryMask(geometry, seen_by.mask());
         geometry
     }
 }
@@ -420,6 +463,7 @@ mod tests {
             &[Geometry::Mesh {
                 vertices,
                 triangles,
+                seen_by: RayKinds::ALL,
             }],
         )
         .expect("a valid mesh")
@@ -440,6 +484,7 @@ mod tests {
         let mesh = Geometry::Mesh {
             vertices: Arc::new(vertices),
             triangles: Arc::new(triangles),
+            seen_by: RayKinds::ALL,
         };
         let build = |limit| {
             let device = Device::with_limit(1, limit).expect("Embree is installed");
@@ -488,10 +533,11 @@ mod tests {
             &[Geometry::Instance {
                 shared: 0,
                 to_world: Affine3A::IDENTITY,
+                seen_by: RayKinds::ALL,
             }],
         )
         .expect("a valid instance");
-        let record = scene.query(Ray::new(vec3(0.25, 0.25, 2.0), DOWN));
+        let record = scene.query(Ray::new(vec3(0.25, 0.25, 2.0), DOWN), u32::MAX);
         assert_eq!(record.hit.instID[0], 0);
         assert_ne!(
             record.pad[0], CANARY,
@@ -511,6 +557,7 @@ mod tests {
         let place = |x| Geometry::Instance {
             shared: 0,
             to_world: Affine3A::from_translation(vec3(x, 0.0, 0.0)),
+            seen_by: RayKinds::ALL,
         };
         let scene = Accelerator::build(device, shared, &[place(0.0), place(5.0)]).expect("valid");
         let hit = scene
@@ -530,10 +577,12 @@ mod tests {
         let instance = |x| Geometry::Instance {
             shared: 0,
             to_world: Affine3A::from_translation(vec3(x, 0.0, 0.0)),
+            seen_by: RayKinds::ALL,
         };
         let mesh = Geometry::Mesh {
             vertices,
             triangles,
+            seen_by: RayKinds::ALL,
         };
         let shared = shared(&device);
         let mut geometries = [instance(5.0), mesh, instance(3.0)];
@@ -557,6 +606,36 @@ mod tests {
         }
     }
 
+    /// A mesh for cameras and an instance for shadow rays, one above the other.
+    #[test]
+    fn rays_meet_what_their_kind_sees() {
+        let device = device();
+        let (vertices, triangles) = unit_triangle();
+        let geometries = [
+            Geometry::Mesh {
+                vertices,
+                triangles,
+                seen_by: RayKinds::all_but([RayKind::Shadow, RayKind::Glossy]),
+            },
+            Geometry::Instance {
+                shared: 0,
+                to_world: Affine3A::from_translation(vec3(0.0, 0.0, 1.0)),
+                seen_by: RayKinds::all_but([RayKind::Camera, RayKind::Glossy]),
+            },
+        ];
+        let scene = Accelerator::build(Arc::clone(&device), vec![shared(&device)], &geometries)
+            .expect("valid");
+        let ray = Ray::new(vec3(0.25, 0.25, 2.0), DOWN);
+        let met = |kind| scene.intersect_as(kind, ray).map(|hit| hit.geometry);
+        assert_eq!(met(RayKind::Camera), Some(0));
+        assert_eq!(met(RayKind::Shadow), Some(1));
+        assert_eq!(met(RayKind::Diffuse), Some(1));
+        assert_eq!(met(RayKind::Glossy), None);
+        assert!(scene.occluded_as(RayKind::Camera, ray) && scene.occluded(ray));
+        assert!(!scene.occluded_as(RayKind::Glossy, ray));
+        assert_eq!(scene.intersect(ray).map(|hit| hit.geometry), Some(1));
+    }
+
     #[test]
     fn an_index_out_of_range_is_an_error_and_never_reaches_the_library() {
         let (vertices, _) = unit_triangle();
@@ -567,6 +646,7 @@ mod tests {
             &[Geometry::Mesh {
                 vertices,
                 triangles,
+                seen_by: RayKinds::ALL,
             }],
         )
         .expect_err("vertex 3 of 3");

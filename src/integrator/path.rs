@@ -22,6 +22,7 @@ use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
 use crate::integrator::split::{Split, Spread};
+use crate::rays::RayKind;
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::Surface;
 
@@ -117,9 +118,8 @@ impl<const F: u32> PathTracer<'_, F> {
     /// the light on the way; `None` when the path ends.
     fn next_surface(&self, path: &mut Path, found: &mut Found) -> Option<Surface> {
         loop {
-            let camera = path.bounce == 0;
             found.rays += 1;
-            let hit = self.scene.accelerator.intersect(path.ray);
+            let hit = self.intersect(path.ray, path.kind);
             let mut emitted = self.lamps(path, hit.map(|hit| hit.t));
             let Some(hit) = hit else {
                 emitted += self.world(path);
@@ -135,15 +135,6 @@ impl<const F: u32> PathTracer<'_, F> {
                 if path.throughput == Rgb::ZERO {
                     return None;
                 }
-            }
-            if has::<F>(Features::HIDDEN_OBJECTS)
-                && camera
-                && path.vertex < MAX_STRAIGHT
-                && !self.scene.objects[surface.object].visible_to_camera
-            {
-                path.deposit(emitted, &mut found.radiance);
-                path.pass_through(&surface);
-                continue;
             }
             if has::<F>(Features::EMISSIVE_MESHES) {
                 emitted += self.surface_emission(path, &surface);
@@ -222,6 +213,11 @@ impl<const F: u32> PathTracer<'_, F> {
         path.bounce += 1;
         path.ray = surface.spawn(sample.wi);
         path.multiple |= sample.order > 1;
+        path.kind = match has::<F>(Features::RAY_VISIBILITY) {
+            true => sample.kind,
+            // Then all that are not the camera's see the same.
+            false => RayKind::Diffuse,
+        };
         path.last = Vertex {
             receiver: self.scene.receiver(surface),
             pdf,

@@ -26,6 +26,7 @@ pub use triangles::{EmissiveTriangle, EmitterId};
 
 use crate::color::Rgb;
 use crate::embree::Ray;
+use crate::rays::{RayKind, RayKinds};
 use glam::Vec3;
 use select::{Chooser, FEW, Far, Many, Reach};
 use tree::{Extent, Tree};
@@ -78,8 +79,8 @@ pub struct LightSample {
 pub struct Light {
     /// What it is.
     pub shape: Shape,
-    /// Whether camera rays see it.
-    pub visible_to_camera: bool,
+    /// The kinds of rays that meet it, and of scattering that light samples reach.
+    pub seen_by: RayKinds,
 }
 
 /// The kinds of lamps.
@@ -183,6 +184,8 @@ pub struct Lights {
     sized_tree: Option<Tree>,
     /// The suns that are disks.
     suns: Vec<u32>,
+    /// The rays that see the surroundings.
+    world_seen_by: RayKinds,
 }
 
 /// What there is to choose from, in the order of the chooser's indices.
@@ -224,6 +227,7 @@ impl Lights {
             sized_tree: (balls.len() > 1).then(|| Tree::new(&balls)).flatten(),
             sized,
             suns,
+            world_seen_by: RayKinds::ALL,
         };
         let candidates = || (0..).map_while(|index| lights.candidate(index));
         lights.chooser = if many {
@@ -245,6 +249,30 @@ impl Lights {
             }
         };
         lights
+    }
+
+    /// The same with surroundings that are black for all other rays.
+    #[must_use]
+    pub fn with_world_seen_by(self, kinds: RayKinds) -> Self {
+        Self {
+            world_seen_by: kinds,
+            ..self
+        }
+    }
+
+    /// Whether some lamp is hidden from rays beside those from the camera.
+    #[must_use]
+    pub fn hides_from_scattered(&self) -> bool {
+        self.lamps
+            .iter()
+            .any(|light| light.seen_by.hides_from_scattered())
+    }
+
+    /// The rays that see the surroundings.
+    #[must_use]
+    #[inline(always)]
+    pub fn world_seen_by(&self) -> RayKinds {
+        self.world_seen_by
     }
 
     /// Whether there is nothing to sample: no lamps, no emissive triangles and
@@ -315,13 +343,32 @@ impl Lights {
         u_select: f32,
         u: [f32; 2],
     ) -> Option<LightSample> {
+        let (sample, _) = self.sample_with_kinds(receiver, u_select, u)?;
+        Some(sample)
+    }
+
+    /// As [`Lights::sample`], with the kinds of scattering that see the lamp or the
+    /// surroundings; who sees a triangle is its object's matter.
+    #[must_use]
+    pub fn sample_with_kinds(
+        &self,
+        receiver: impl Into<Receiver>,
+        u_select: f32,
+        u: [f32; 2],
+    ) -> Option<(LightSample, RayKinds)> {
         let receiver = receiver.into();
         let p = receiver.position;
         let (index, selection, rest) =
             self.chooser
                 .as_ref()?
                 .choose(&receiver, u_select, u, |index| self.contribution(index, p))?;
-        let sample = match self.candidate(index)? {
+        let candidate = self.candidate(index)?;
+        let kinds = match candidate {
+            Candidate::Lamp(light) => light.seen_by,
+            Candidate::Environment(_) => self.world_seen_by,
+            Candidate::Together(_) | Candidate::Triangle(..) => RayKinds::ALL,
+        };
+        let sample = match candidate {
             Candidate::Lamp(light) => light.shape.sample(p, selection, u),
             Candidate::Environment(image) => Some(image.sample(selection, u)),
             Candidate::Together(triangles) => {
@@ -337,20 +384,20 @@ impl Lights {
             && sample.direction.is_finite()
             && sample.radiance.is_finite()
             && sample.radiance != Rgb::ZERO;
-        usable.then_some(sample)
+        usable.then_some((sample, kinds))
     }
 
     /// Calls `visit` with the radiance (W·m⁻²·sr⁻¹) and the density (sr⁻¹, as
     /// [`Lights::sample`] from the ray's origin has it for that normal) of every lamp that the
     /// ray meets before its end, and of every sun when the end is infinite.
-    /// `camera` says that it is a camera ray, which does not see all lights.
+    /// Rays of this `kind` do not see all lights.
     /// The ray's direction must be a unit vector.
     #[inline]
     pub fn crossed(
         &self,
         ray: &Ray,
         normal: Option<Vec3>,
-        camera: bool,
+        kind: RayKind,
         mut visit: impl FnMut(Rgb, f32, f32),
     ) {
         let receiver = Receiver {
@@ -359,7 +406,7 @@ impl Lights {
         };
         let mut test = |index: u32| {
             let light = &self.lamps[index as usize];
-            if camera && !light.visible_to_camera {
+            if !light.seen_by.contains(kind) {
                 return;
             }
             if let Some((radiance, pdf, distance)) = light.shape.crossed(ray) {

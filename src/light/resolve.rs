@@ -129,7 +129,7 @@ pub fn resolve_light(
     };
     Ok(Light {
         shape,
-        visible_to_camera: light.visible_to_camera,
+        seen_by: light.seen_by(),
     })
 }
 
@@ -143,14 +143,15 @@ pub fn resolve_world<E>(
     load: impl FnOnce(&Path) -> Result<EnvironmentImage, E>,
 ) -> Result<World, E> {
     Ok(match world {
-        description::World::Constant { color, strength } => {
-            World::Constant(Rgb::from(*color) * *strength)
-        }
+        description::World::Constant {
+            color, strength, ..
+        } => World::Constant(Rgb::from(*color) * *strength),
         description::World::Environment {
             file,
             strength,
             color,
             rotation,
+            hidden_from: _,
         } => {
             let scale = Rgb::from(*color) * *strength;
             let [x, y, z] = rotation.map(f32::to_radians);

@@ -35,6 +35,7 @@ use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
 use crate::features::{Features, has};
 use crate::light::{Lights, Receiver};
+use crate::rays::RayKinds;
 use crate::texture::Texture;
 
 /// A mesh and what the scene needs of it.
@@ -89,8 +90,8 @@ pub struct Object {
     pub mirrored: bool,
     /// Material indices by slot.
     pub materials: Vec<usize>,
-    /// Whether camera rays see it.
-    pub visible_to_camera: bool,
+    /// The rays that meet it.
+    pub seen_by: RayKinds,
     /// For an emissive object, the number of its first triangle among the
     /// emissive triangles of all objects.
     pub first_emitter: Option<u32>,

@@ -21,6 +21,7 @@ use crate::film::Identity;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::memory::Budget;
 use crate::mesh::Mesh;
+use crate::rays::RayKinds;
 use crate::texture::Texture;
 
 /// A scene, and what was mended to get it.
@@ -212,7 +213,11 @@ pub(super) fn build(
     let names = source.textures().iter().cloned();
     let used = names.zip(textures.iter().cloned());
     stage.lend(description, lent, used, &contents);
-    let lights = Lights::new(lamps, world, triangles);
+    let world_seen_by = description
+        .world
+        .as_ref()
+        .map_or(RayKinds::ALL, |w| w.seen_by());
+    let lights = Lights::new(lamps, world, triangles).with_world_seen_by(world_seen_by);
     let mut scene = Scene {
         accelerator,
         emitters: emitters(&objects, &scene_meshes),
@@ -404,9 +409,14 @@ impl<'a> Placing<'a> {
             Geometry::Mesh {
                 vertices: Arc::clone(&self.scene_meshes[mesh].vertices),
                 triangles: Arc::clone(&self.scene_meshes[mesh].triangles),
+                seen_by: object.seen_by(),
             }
         } else {
-            Geometry::Instance { shared, to_world }
+            Geometry::Instance {
+                shared,
+                to_world,
+                seen_by: object.seen_by(),
+            }
         };
         let runtime = Object {
             name: name.to_owned(),
@@ -417,7 +427,7 @@ impl<'a> Placing<'a> {
             world_to_box: None,
             mirrored: determinant < 0.0,
             materials: material_indices,
-            visible_to_camera: object.visible_to_camera,
+            seen_by: object.seen_by(),
             first_emitter: None,
         };
         Ok((runtime, geometry))
@@ -585,8 +595,10 @@ fn features(scene: &Scene) -> Features {
         scene.objects.iter().any(|o| o.to_world.is_some()),
     );
     set.add_if(
-        Features::HIDDEN_OBJECTS,
-        scene.objects.iter().any(|o| !o.visible_to_camera),
+        Features::RAY_VISIBILITY,
+        scene.objects.iter().any(|o| o.seen_by != RayKinds::ALL)
+            || scene.lights.hides_from_scattered()
+            || scene.lights.world_seen_by() != RayKinds::ALL,
     );
     set.add_if(
         Features::SMOOTH_NORMALS,

@@ -7,6 +7,7 @@ use smithwalk::embree::Ray;
 use smithwalk::light::{
     AreaLight, Bulb, EmissiveTriangle, Light, Lights, Outline, PointLight, Receiver, Shape, World,
 };
+use smithwalk::rays::{RayKind, RayKinds};
 use std::f32::consts::PI;
 
 /// The bound of every z-test. One test in 1.7 million is a false alarm; there
@@ -42,7 +43,7 @@ pub fn lamps(shapes: impl IntoIterator<Item = Shape>) -> Lights {
         .into_iter()
         .map(|shape| Light {
             shape,
-            visible_to_camera: false,
+            seen_by: RayKinds::ALL,
         })
         .collect();
     Lights::new(lamps, black(), Vec::new())
@@ -156,7 +157,7 @@ pub fn check_crossings(lights: &Lights, p: Vec3, n: usize, seed: u64, tolerance:
             ray.t_far = sample.distance * 1.01;
         }
         let mut met = false;
-        lights.crossed(&ray, None, false, |radiance, pdf, _| {
+        lights.crossed(&ray, None, RayKind::Diffuse, |radiance, pdf, _| {
             met |= (radiance - sample.radiance).length() <= tolerance * sample.radiance.length()
                 && (pdf / sample.pdf - 1.0).abs() <= tolerance;
         });
@@ -178,7 +179,9 @@ pub fn total_density(lights: &Lights, p: Vec3, n: usize, seed: u64) -> Estimate 
     Estimate::of(n, || {
         let ray = Ray::new(p, direction(&mut rng));
         let mut sum = 0.0;
-        lights.crossed(&ray, None, false, |_, pdf, _| sum += f64::from(pdf));
+        lights.crossed(&ray, None, RayKind::Diffuse, |_, pdf, _| {
+            sum += f64::from(pdf)
+        });
         sum * 4.0 * std::f64::consts::PI
     })
 }

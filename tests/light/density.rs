@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use rand::RngExt;
 use smithwalk::embree::Ray;
 use smithwalk::light::{Bulb, EmitterId, Light, Lights, Outline, Shape, SunLight};
+use smithwalk::rays::{RayKind, RayKinds};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 fn wide_lights() -> Vec<(&'static str, Shape)> {
@@ -183,24 +184,27 @@ fn triangles_know_their_density() {
 #[test]
 fn camera_rays_see_only_visible_lights() {
     let shape = area(Vec3::Z, Outline::Rectangle, [1.0; 2], 2.0);
-    for visible_to_camera in [false, true] {
-        let lamp = Light {
-            shape,
-            visible_to_camera,
-        };
+    for seen_by in [RayKinds::ALL, RayKinds::all_but([RayKind::Camera])] {
+        let lamp = Light { shape, seen_by };
         let lights = Lights::new(vec![lamp], black(), Vec::new());
-        let count = |ray: &Ray, camera| {
+        let count = |ray: &Ray, kind| {
             let mut count = 0;
-            lights.crossed(ray, None, camera, |_, _, _| count += 1);
+            lights.crossed(ray, None, kind, |_, _, _| count += 1);
             count
         };
         let mut ray = Ray::new(Vec3::ZERO, Vec3::Z);
-        assert_eq!(count(&ray, false), 1);
-        assert_eq!(count(&ray, true), usize::from(visible_to_camera));
+        assert_eq!(count(&ray, RayKind::Glossy), 1);
+        assert_eq!(
+            count(&ray, RayKind::Camera),
+            usize::from(seen_by == RayKinds::ALL)
+        );
         ray.t_far = 0.9;
-        assert_eq!(count(&ray, false), 0);
+        assert_eq!(count(&ray, RayKind::Glossy), 0);
         // Behind the light there is nothing to see.
-        assert_eq!(count(&Ray::new(Vec3::Z * 2.0, Vec3::NEG_Z), false), 0);
+        assert_eq!(
+            count(&Ray::new(Vec3::Z * 2.0, Vec3::NEG_Z), RayKind::Glossy),
+            0
+        );
     }
 }
 

@@ -38,6 +38,7 @@ fn unturned(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Option<Enviro
 /// As a scene file asks for it, with Blender's Euler angles in degrees.
 fn turned(image: EnvironmentImage, rotation: [f32; 3]) -> Environment {
     let world = description::World::Environment {
+        hidden_from: Vec::new(),
         file: "sky.exr".into(),
         strength: 2.0,
         color: [0.5; 3],
@@ -252,6 +253,7 @@ fn poles_of_fine_images_keep_their_digits() {
 fn a_black_image_is_no_environment() {
     assert!(unturned(2, 1, vec![[0.0; 3]; 2]).is_none());
     let world = description::World::Environment {
+        hidden_from: Vec::new(),
         file: "night.exr".into(),
         strength: 1.0,
         color: [1.0; 3],
@@ -266,6 +268,7 @@ fn a_black_image_is_no_environment() {
 #[test]
 fn a_constant_world_is_not_sampled() {
     let world = description::World::Constant {
+        hidden_from: Vec::new(),
         color: [1.0; 3],
         strength: 2.0,
     };

@@ -4,6 +4,7 @@ use crate::light::common::*;
 use glam::{DVec3, Vec3};
 use rand::RngExt;
 use smithwalk::light::{Bulb, Lights, Outline, Shape, SunLight};
+use smithwalk::rays::RayKind;
 
 /// The shapes of a scene of size `s` with radiances that don't depend on it.
 fn shapes(s: f32) -> Vec<Shape> {
@@ -92,7 +93,7 @@ fn samples_are_finite_wherever_they_are_taken_from() {
                     assert!(sample.distance > 0.0);
                 }
                 let ray = smithwalk::embree::Ray::new(p, direction(&mut rng));
-                lights.crossed(&ray, None, false, |radiance, pdf, _| {
+                lights.crossed(&ray, None, RayKind::Diffuse, |radiance, pdf, _| {
                     assert!(radiance.is_finite() && pdf >= 0.0 && !pdf.is_nan());
                 });
             }

@@ -3,6 +3,7 @@
 use crate::light::common::*;
 use glam::{DVec3, Mat3, Vec3};
 use smithwalk::light::{AreaLight, Beam, Bulb, Lights, Outline, PointLight, Shape, SunLight};
+use smithwalk::rays::RayKinds;
 use std::f32::consts::PI;
 use std::f64::consts::PI as PI64;
 
@@ -302,7 +303,7 @@ fn many_lights_add_up() {
             .into_iter()
             .map(|shape| smithwalk::light::Light {
                 shape,
-                visible_to_camera: false,
+                seen_by: RayKinds::ALL,
             })
             .collect();
         let lights = Lights::new(lamps, black(), quad(quad_at, [1.0; 2], 3.0));

@@ -8,6 +8,7 @@ use smithwalk::light::{
     AreaLight, Beam, Bulb, EmissiveTriangle, Environment, Light, Lights, Outline, PointLight,
     Receiver, Shape, SunLight, World,
 };
+use smithwalk::rays::{RayKind, RayKinds};
 use smithwalk::texture::EnvironmentImage;
 use std::collections::HashMap;
 use std::f32::consts::PI;
@@ -254,7 +255,7 @@ impl Mixture {
     fn lights(&self, lamps: &[Shape], triangles: &[EmissiveTriangle], image: bool) -> Lights {
         let lamps = lamps.iter().map(|&shape| Light {
             shape,
-            visible_to_camera: false,
+            seen_by: RayKinds::ALL,
         });
         let world = if image {
             World::Environment(Box::new(self.environment.clone()))
@@ -324,12 +325,12 @@ fn densities_of_a_mixture_agree() {
             ray.t_far = rng.random_range(2.0..6.0);
         }
         let mut found = Vec::new();
-        lights.crossed(&ray, None, false, |radiance, pdf, _| {
+        lights.crossed(&ray, None, RayKind::Diffuse, |radiance, pdf, _| {
             found.push((radiance.x, pdf))
         });
         let mut expected = Vec::new();
         for light in &apart {
-            light.crossed(&ray, None, false, |radiance, pdf, _| {
+            light.crossed(&ray, None, RayKind::Diffuse, |radiance, pdf, _| {
                 expected.push((radiance.x, pdf))
             });
         }
@@ -352,7 +353,7 @@ fn densities_of_a_mixture_agree() {
         let mut ray = Ray::new(p, sample.direction);
         ray.t_far = sample.distance * 1.01;
         let mut same = false;
-        lights.crossed(&ray, None, false, |_, pdf, _| {
+        lights.crossed(&ray, None, RayKind::Diffuse, |_, pdf, _| {
             same |= (pdf / sample.pdf - 1.0).abs() < 1e-3
         });
         again += i32::from(same) - i32::from(!same) * 1000;

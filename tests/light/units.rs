@@ -6,6 +6,7 @@ use glam::{Affine3A, Mat3, Quat, Vec3};
 use smithwalk::description::{self, AreaShape, LightKind, LightUnits, Transform};
 use smithwalk::embree::Ray;
 use smithwalk::light::{Light, LightError, Lights, resolve_light};
+use smithwalk::rays::RayKind;
 use std::f64::consts::PI;
 
 const POWER: f32 = 200.0;
@@ -18,6 +19,7 @@ fn description(kind: LightKind) -> description::Light {
         color: [1.0; 3],
         exposure: 0.0,
         visible_to_camera: false,
+        hidden_from: Vec::new(),
         kind,
     }
 }
@@ -37,9 +39,14 @@ fn lights(kind: LightKind, units: LightUnits) -> Lights {
 /// The radiance that a ray straight up meets.
 fn radiance(lights: &Lights) -> f64 {
     let mut radiance = f64::NAN;
-    lights.crossed(&Ray::new(Vec3::ZERO, Vec3::Z), None, false, |met, _, _| {
-        radiance = f64::from(met.x);
-    });
+    lights.crossed(
+        &Ray::new(Vec3::ZERO, Vec3::Z),
+        None,
+        RayKind::Diffuse,
+        |met, _, _| {
+            radiance = f64::from(met.x);
+        },
+    );
     radiance
 }
 

@@ -14,6 +14,7 @@ use crate::embree::{Hit, Ray};
 use crate::features::{Features, has};
 use crate::integrator::split::Spread;
 use crate::light::{EmitterId, LightSample};
+use crate::rays::{RayKind, RayKinds};
 use crate::sampler::{Dimension, Purpose, Sampler};
 use crate::scene::{Surface, View};
 
@@ -28,6 +29,8 @@ pub(super) struct Arriving {
     pub wi: Vec3,
     /// L/p times the weight against BSDF samples.
     pub light: Rgb,
+    /// The kinds of scattering that it takes part in.
+    pub seen_by: RayKinds,
 }
 
 impl<const F: u32> PathTracer<'_, F> {
@@ -69,7 +72,8 @@ impl<const F: u32> PathTracer<'_, F> {
         };
         let wo = -path.ray.direction;
         let mut stream = sampler.walk_stream(path.vertex, Purpose::Light);
-        let scattered = bsdf.eval(wo, arriving.wi, &mut stream) * arriving.light;
+        let scattered = bsdf.eval_seen_by(arriving.seen_by, wo, arriving.wi, &mut stream);
+        let scattered = scattered * arriving.light;
         path.deposit_scattered(scattered, &mut found.radiance);
     }
 
@@ -85,7 +89,14 @@ impl<const F: u32> PathTracer<'_, F> {
         let choice = sampler.get_1d(Dimension::light_choice(path.vertex));
         let position = sampler.get_2d(Dimension::light_position(path.vertex));
         let lights = &self.scene.lights;
-        let light = lights.sample(self.scene.receiver(surface), choice, position)?;
+        let receiver = self.scene.receiver(surface);
+        let (light, mut seen_by) = lights.sample_with_kinds(receiver, choice, position)?;
+        if has::<F>(Features::RAY_VISIBILITY) && has::<F>(Features::EMISSIVE_MESHES) {
+            if let Some((EmitterId(emitter), _)) = light.emitter {
+                let object = self.scene.emitters[emitter as usize] as usize;
+                seen_by = self.scene.objects[object].seen_by;
+            }
+        }
         let pdf = bsdf.pdf(-path.ray.direction, light.direction);
         if pdf <= 0.0 {
             return None;
@@ -100,6 +111,7 @@ impl<const F: u32> PathTracer<'_, F> {
         Some(Arriving {
             wi: light.direction,
             light: radiance * factor,
+            seen_by,
         })
     }
 
@@ -130,10 +142,10 @@ impl<const F: u32> PathTracer<'_, F> {
             return self.visible_through_media(path, surface, ray, radiance, rays);
         }
         if !has::<F>(Features::TRANSPARENCY) {
-            return (!self.scene.accelerator.occluded(ray)).then_some(radiance);
+            return (!self.occluded(ray)).then_some(radiance);
         }
         for _ in 0..MAX_STRAIGHT {
-            let Some(hit) = self.scene.accelerator.intersect(ray) else {
+            let Some(hit) = self.intersect(ray, RayKind::Shadow) else {
                 return Some(radiance);
             };
             let (_, beyond) = self.through(ray, &hit, &mut radiance)?;

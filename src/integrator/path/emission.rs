@@ -24,11 +24,10 @@ impl<const F: u32> PathTracer<'_, F> {
             t_far: to_surface.map_or(f32::INFINITY, |t| last.travelled + t),
             ..*ray
         };
-        let camera = path.bounce == 0;
         self.scene.lights.crossed(
             &segment,
             last.receiver.normal,
-            camera,
+            path.kind,
             |radiance, light_pdf, distance| {
                 let found = radiance * last.mis_weight(light_pdf);
                 sum += if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
@@ -44,6 +43,9 @@ impl<const F: u32> PathTracer<'_, F> {
     /// What a ray that leaves the scene brings.
     pub(super) fn world(&self, path: &Path) -> Rgb {
         let lights = &self.scene.lights;
+        if has::<F>(Features::RAY_VISIBILITY) && !lights.world_seen_by().contains(path.kind) {
+            return Rgb::ZERO;
+        }
         let (mut radiance, light_pdf) = lights.world(path.last.receiver, path.ray.direction);
         if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
             radiance *= path.media.transmittance(f32::INFINITY);

@@ -10,7 +10,9 @@ use super::result::Found;
 use super::state::Path;
 use super::tracer::PathTracer;
 use crate::bsdf::{Bsdf, ByOrder, InLanes};
+use crate::features::{Features, has};
 use crate::integrator::split::Spread;
+use crate::rays::RayKind;
 use crate::sampler::{Purpose, Sampler};
 use crate::scene::Surface;
 use smithwalk_model::LANES;
@@ -50,7 +52,11 @@ impl<const F: u32> PathTracer<'_, F> {
             let mut rays = 0;
             let arriving = self.arriving(path, surface, bsdf, sampler, &mut rays);
             mean.add_rays(rays);
-            if let Some(arriving) = arriving {
+            // Lanes are for metals.
+            let seen = |a: &Arriving| {
+                !has::<F>(Features::RAY_VISIBILITY) || a.seen_by.contains(RayKind::Glossy)
+            };
+            if let Some(arriving) = arriving.filter(seen) {
                 batch.push(Waiting { index, arriving });
             }
             if batch.is_full() {

@@ -5,6 +5,7 @@ use crate::bsdf::ByOrder;
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::light::Receiver;
+use crate::rays::RayKind;
 use crate::scene::{Surface, View};
 
 /// A path on its way.
@@ -24,6 +25,8 @@ pub(super) struct Path {
     pub to_surface: f32,
     /// What it is inside of.
     pub media: Media,
+    /// What its ray is seen as: by the last scattering.
+    pub kind: RayKind,
 }
 
 /// The last vertex that light samples could have continued from.
@@ -54,6 +57,7 @@ impl Path {
             bounce: 0,
             to_surface: 0.0,
             media: Media::default(),
+            kind: RayKind::Camera,
         }
     }
 

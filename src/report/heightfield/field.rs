@@ -9,6 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use crate::embree::{Accelerator, Device, EmbreeError, Geometry, Hit, Vertices};
+use crate::rays::RayKinds;
 use smithwalk_model::{Draw, Stream};
 
 /// The random numbers of everything here.
@@ -134,6 +135,7 @@ impl Patch {
         let vertices = Arc::new(Vertices::from(positions));
         let triangles = Arc::new(triangles);
         let mesh = Geometry::Mesh {
+            seen_by: RayKinds::ALL,
             vertices: Arc::clone(&vertices),
             triangles: Arc::clone(&triangles),
         };
