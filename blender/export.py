@@ -32,7 +32,21 @@ def parse(args, with_file):
     parser.add_argument("--bake-size", type=int, default=1024, metavar="PIXELS",
                         help="width of images baked over a surface (%(default)s)")
     parser.add_argument("--view-layer", metavar="NAME", help="instead of the first")
+    parser.add_argument("--frames", metavar="A..B", type=_frames,
+                        help="what moves from frame A to B, apart from what does not")
     return parser.parse_args(args)
+
+
+def _frames(text):
+    """Both ends included."""
+    first, found, last = text.partition("..")
+    try:
+        numbers = range(int(first), int(last if found else first) + 1)
+    except ValueError:
+        numbers = ()
+    if not numbers:
+        raise argparse.ArgumentTypeError(f"expected A..B with A at most B, e.g. 1..250, not {text!r}")
+    return numbers
 
 
 def main(argv):
@@ -64,7 +78,7 @@ def main(argv):
                 raise ExportError(f"no such file: {args.blend}")
             bpy.ops.wm.open_mainfile(filepath=os.path.abspath(args.blend))
         log = export(bpy.context.scene, args.out, bake=NO_BAKE if args.no_bake else BAKE, bake_size=args.bake_size,
-                     layer=args.view_layer)
+                     layer=args.view_layer, frames=args.frames)
         if args.json:
             with open(args.json, "w", encoding="utf-8") as f:
                 f.write(log.json())
@@ -76,7 +90,8 @@ def main(argv):
         return 1
     print(log.summary())
     if log.options:
-        print(f"Blender's settings: smithwalk render {log.path} {' '.join(log.options)}")
+        frames = f" --frames {args.frames[0]}..{args.frames[-1]}" if args.frames else ""
+        print(f"Blender's settings: smithwalk render {log.path}{frames} {' '.join(log.options)}")
     return 3 if args.strict and log.strict_failure else 0
 
 

@@ -351,6 +351,77 @@ class ExportTest(unittest.TestCase):
         self.assertEqual(self.line("depth_of_field:"), "depth_of_field: {fstop: 2, focus_distance: 4}")
         self.assertEqual((self.line("width:"), self.line("height:")), ("width: 32", "height: 24"))
 
+    # Visibility, film, view
+
+    def test_visibility(self):
+        """Rays that pass an object, a light and the world; a holdout; what the camera's planes cut."""
+        ob = self.cube()
+        ob.visible_diffuse = ob.visible_shadow = False
+        ob.is_holdout = True
+        lamp = common.area_light(self.scene, "Lamp", (0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (1.0, 1.0), 10.0)
+        lamp.visible_glossy = False
+        common.constant_world(self.scene, (1.0, 1.0, 1.0), 1.0)
+        visibility = getattr(self.scene.world, "cycles_visibility", None)
+        if visibility:
+            visibility.camera = False
+        self.scene.camera.data.clip_end = 6.0
+        self.export()
+        self.assertIn("hidden_from: [diffuse, shadow], holdout: true", self.line("{name: Cube"))
+        self.assertIn("hidden_from: [glossy]", self.line("{area: "))
+        self.assertEqual(sum("hidden_from: [camera]" in line for line in self.lines), 1 if visibility else 0)
+        self.assertIn("[0.1, 6]", self.line("clip:"))
+        self.assertEqual(self.losses(), [])
+
+    def test_film(self):
+        """Film exposure and transparency are the renderer's; plain sRGB needs no table."""
+        self.scene.cycles.film_exposure = 2.0
+        self.scene.render.film_transparent = True
+        self.scene.view_settings.view_transform = "Standard"
+        self.scene.view_settings.exposure = 0.5
+        self.cube()
+        self.export()
+        self.assertEqual((self.line("gain:"), self.line("transparent:"), self.line("exposure:")),
+                         ("gain: 2", "transparent: true", "exposure: 0.5"))
+        self.assertFalse(os.path.exists(self.path("view.cube")))
+        self.scene.view_settings.view_transform = "Filmic"
+        self.export()
+        self.assertIn("{lut: view.cube, log2: {offset: 0.00390625", self.line("view:"))
+        self.assertEqual(self.losses(), [])
+
+    def test_frames(self):
+        """What moves is in the files of all frames, what does not is written once."""
+        still, moving, bending = (self.cube(location=(x, 0.0, 0.0)) for x in (-3.0, 0.0, 3.0))
+        for number, height in ((1, 0.0), (3, 2.0)):
+            moving.location.z = height
+            moving.keyframe_insert("location", frame=number)
+        bending.shape_key_add(name="Basis")
+        key = bending.shape_key_add(name="Bent")
+        key.data[0].co.z += 1.0
+        for number, value in ((2, 0.0), (3, 1.0)):
+            key.value = value
+            key.keyframe_insert("value", frame=number)
+        self.scene.frame_set(2)
+        self.export(frames=range(1, 4))
+        self.assertEqual(self.scene.frame_current, 2)
+        self.assertEqual(self.line("frames:"), 'frames: "frame_####.yaml"')
+        self.assertEqual(self.losses(), [])
+        names = [ob.name for ob in (still, moving, bending)]
+        order = [next(n for n in names if line.startswith(f"{{name: {yaml.flow(n)},"))
+                 for line in self.lines if line.startswith("{name: ")]
+        at = order.index(moving.name)
+        frames = []
+        for number in (1, 2, 3):
+            with open(self.path(f"frame_{number:04}.yaml"), encoding="utf-8") as f:
+                frames.append(dict(line.rstrip("\n").split(": ", 1) for line in f))
+        self.assertTrue(all(f.keys() == frames[0].keys() for f in frames))
+        self.assertEqual(len(frames[0]), 2, frames[0])
+        place = f"objects.{at}.transform"
+        self.assertEqual([f[place].split("], [")[2].split(", ")[3] for f in frames], ["0", "1", "2"])
+        mesh, = frames[0].keys() - {place}
+        self.assertEqual(frames[0][mesh], frames[1][mesh])
+        self.assertNotEqual(frames[1][mesh], frames[2][mesh])
+        self.assertEqual(len([f for f in os.listdir(self.folder.name) if f.endswith(".obj")]), 2)
+
     def test_settings_are_restored(self):
         """The export leaves the scene as it was."""
         self.cube()

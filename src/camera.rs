@@ -25,6 +25,8 @@ pub struct Camera {
     corner: Vec2,
     parallel: bool,
     lens: Option<Lens>,
+    /// Where along the view axis it begins and ends to see, in metres.
+    clip: [f32; 2],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -127,6 +129,7 @@ impl Camera {
             corner,
             parallel: matches!(camera.projection, Projection::Orthographic(_)),
             lens,
+            clip: camera.clip.unwrap_or([0.0, f32::INFINITY]),
         })
     }
 
@@ -144,11 +147,21 @@ impl Camera {
             (self.position, self.forward + across)
         };
         let Some(Lens { radius, focus }) = self.lens else {
-            return Ray::new(eye, sight.normalize());
+            return self.clipped(eye, sight.normalize());
         };
         let [x, y] = unit_disk(lens);
         let aside = (self.right * x + self.up * y) * radius;
-        Ray::new(eye + aside, (sight * focus - aside).normalize())
+        self.clipped(eye + aside, (sight * focus - aside).normalize())
+    }
+
+    /// A ray between the planes that the camera sees from and to.
+    fn clipped(&self, origin: Vec3, direction: Vec3) -> Ray {
+        let [t_near, t_far] = self.clip.map(|depth| depth / direction.dot(self.forward));
+        Ray {
+            t_near,
+            t_far,
+            ..Ray::new(origin, direction)
+        }
     }
 
     /// Whether rays depend on the point of the aperture.

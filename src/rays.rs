@@ -29,11 +29,13 @@ impl RayKinds {
     /// All but these.
     #[must_use]
     pub fn all_but(hidden: impl IntoIterator<Item = RayKind>) -> Self {
-        Self(
-            hidden
-                .into_iter()
-                .fold(Self::ALL.0, |left, kind| left & !kind.bit()),
-        )
+        hidden.into_iter().fold(Self::ALL, Self::without)
+    }
+
+    /// This set without a kind.
+    #[must_use]
+    pub fn without(self, kind: RayKind) -> Self {
+        Self(self.0 & !kind.bit())
     }
 
     /// Whether a kind is among them.

@@ -21,6 +21,7 @@ fn perspective() -> Perspective {
 
 fn description(projection: Projection) -> description::Camera {
     description::Camera {
+        clip: None,
         transform: Transform::default(),
         projection,
         depth_of_field: None,

@@ -105,6 +105,8 @@ fn what_is_left_out_has_the_documented_default() {
     assert_eq!(
         bare.film,
         Film {
+            gain: 1.0,
+            transparent: false,
             width: 256,
             height: 256,
             filter: Filter::Box {},

@@ -23,7 +23,7 @@ class Folder:
         self.scene_name = scene_name
         self._before = self._earlier_export()
         self._taken = {f.lower() for f in os.listdir(path)} - {f.lower() for f in self._before}
-        self._beside = tempfile.mkdtemp(prefix=".smithwalk-", dir=path)
+        self.beside = tempfile.mkdtemp(prefix=".smithwalk-", dir=path)
         self._names = []
 
     def _earlier_export(self):
@@ -48,12 +48,16 @@ class Folder:
             candidate, n = f"{stem}_{n}{extension}", n + 1
         self._taken.add(candidate.lower())
         self._names.append(candidate)
-        return os.path.join(self._beside, candidate), candidate
+        return os.path.join(self.beside, candidate), candidate
+
+    def paths(self):
+        """Where the files are now, by the names that they will have."""
+        return {name: os.path.join(self.beside, name) for name in self._names}
 
     def drop(self, name):
         """Take back a name from `new` that no file was written for."""
         self._names.remove(name)
-        path = os.path.join(self._beside, name)
+        path = os.path.join(self.beside, name)
         if os.path.exists(path):
             os.remove(path)
 
@@ -66,11 +70,11 @@ class Folder:
 
     def commit(self, scene_text):
         """Move everything to its place, scene.yaml last; returns the path of scene.yaml."""
-        scene = os.path.join(self._beside, self.scene_name)
+        scene = os.path.join(self.beside, self.scene_name)
         with open(scene, "w", encoding="utf-8") as f:
             f.write(_MARK + json.dumps(self._names, ensure_ascii=False) + "\n" + scene_text)
         for name in self._names + [self.scene_name]:
-            os.replace(os.path.join(self._beside, name), os.path.join(self.path, name))
+            os.replace(os.path.join(self.beside, name), os.path.join(self.path, name))
         for name in set(self._before) - set(self._names) - {self.scene_name}:
             stale = os.path.join(self.path, name)
             if os.path.isfile(stale):
@@ -80,4 +84,4 @@ class Folder:
 
     def close(self):
         """Remove what was not moved."""
-        shutil.rmtree(self._beside, ignore_errors=True)
+        shutil.rmtree(self.beside, ignore_errors=True)

@@ -37,6 +37,16 @@ def rigid(m):
     return rotation.to_matrix().to_4x4(), location
 
 
+# The kinds of rays that objects may be hidden from, beside the camera's.
+RAYS = ("diffuse", "glossy", "transmission", "shadow")
+
+
+def hidden_from(ob):
+    """The rays that pass an object, beside the camera's; of a light, those that have a say."""
+    return [kind for kind in RAYS if not getattr(ob, f"visible_{kind}")
+            and not (ob.type == "LIGHT" and kind == "shadow")]
+
+
 class LightWriter:
     """Turns light objects into lights of the scene format."""
 
@@ -72,6 +82,8 @@ class LightWriter:
             keys["color"] = rgb
         if ob.visible_camera:
             keys["visible_to_camera"] = True
+        if hidden_from(ob):
+            keys["hidden_from"] = hidden_from(ob)
         if not getattr(ob.data, "use_shadow", True) and bpy.app.version >= (4, 0, 0) \
                 or not getattr(ob.data.cycles, "cast_shadow", True):
             self.log.warn(where, "casts shadows here though not in Blender")
@@ -249,8 +261,9 @@ def camera(scene, depsgraph, audit, log):
         m = m if abs(m.to_3x3().determinant()) > 1e-12 else _unscaled(m)
         section = {"transform": matrix(m), "projection": projection}
 
-    near, far = data.clip_start, data.clip_end
-    _clipping(scene, depsgraph, ob, near, far, where, log)
+    near, far = max(data.clip_start, 0.0), data.clip_end
+    if _clips(depsgraph, ob, near, far):
+        section["clip"] = [near, max(far, near + 1e-6)]
     dof = data.dof
     if dof.use_dof:
         distance = dof.focus_distance
@@ -278,26 +291,16 @@ def camera(scene, depsgraph, audit, log):
     return section
 
 
-def _clipping(scene, depsgraph, camera_ob, near, far, where, log):
-    """Name a clip range that cuts into the scene: the renderer does not clip."""
+def _clips(depsgraph, camera_ob, near, far):
+    """Whether a clip range cuts into the scene."""
     if not is_finite(camera_ob.matrix_world):
-        return
+        return False
     to_camera = _unscaled(camera_ob.matrix_world).inverted()
-    cut = []
     for instance in depsgraph.object_instances:
         ob = instance.object
         if ob.type != "MESH" or not instance.show_self or not is_finite(instance.matrix_world):
             continue
         depths = [-(to_camera @ instance.matrix_world @ Vector(c)).z for c in ob.bound_box]
-        # A floor that reaches behind the camera is cut by every near plane: only
-        # one that was moved away from where Blender puts it counts then.
-        nearer = min(depths) < near and max(depths) > 0.0 and (min(depths) > 0.0 or near > 0.1001)
-        if max(depths) > far or nearer:
-            cut.append(ob.name)
-        if len(cut) > 3:
-            break
-    if cut:
-        log.warn(where, f"clips at {near:g} m and {far:g} m in Blender, not here "
-                        f"({', '.join(cut[:3])}{' …' if len(cut) > 3 else ''})")
-
-
+        if max(depths) > far or min(depths) < near and max(depths) > 0.0:
+            return True
+    return False

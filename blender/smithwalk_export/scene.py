@@ -13,6 +13,7 @@ import bpy
 
 from . import cycles, lights, settings, view, yaml
 from .audit import DEFAULTS, Audit
+from .animation import export_frames
 from .bake import Baker
 from .files import Folder
 from .images import ImageWriter
@@ -42,7 +43,6 @@ _CONVEYED = (
     "proxy_collection", "track_axis", "add_rest_position_attribute", "use_dynamic_topology_sculpting",
     "cycles.use_adaptive_subdivision", "cycles.dicing_rate",
 )
-_RAYS = ("diffuse", "glossy", "transmission", "shadow")
 
 
 class ExportError(Exception):
@@ -223,6 +223,20 @@ class Job:
             files.close()
 
     def _write(self, depsgraph, files):
+        sections, note, options = self._sections(depsgraph, files)
+        self.log.path = files.commit(yaml.document(sections, note=note))
+        self.log.options = options
+        for kind in ("objects", "lights", "meshes", "materials", "textures"):
+            self.log.count(kind, len(sections.get(kind, ())))
+        return self.log
+
+    def frame(self, depsgraph):
+        """The sections of a frame, their files by name, the scene's note, and options of the renderer."""
+        files = Folder(self.folder)
+        sections, note, options = self._sections(depsgraph, files)
+        return sections, files.paths(), note, options
+
+    def _sections(self, depsgraph, files):
         scene, log = self.scene, self.log
         images = ImageWriter(files, log)
         self.materials.images = images
@@ -262,11 +276,7 @@ class Job:
         note = scene.get("smithwalk_note") or ""
         if options:
             note += ("\n" if note else "") + "Blender's settings as options of `smithwalk render`: " + " ".join(options)
-        log.path = files.commit(yaml.document(sections, note=note))
-        log.options = options
-        for kind in ("objects", "lights", "meshes", "materials", "textures"):
-            log.count(kind, len(sections.get(kind, ())))
-        return log
+        return sections, note, options
 
     def _objects(self, depsgraph, meshes):
         """Objects and lights, every instance on its own with its world matrix."""
@@ -307,20 +317,15 @@ class Job:
                 continue
             if ob.name_full not in audited:
                 audited.add(ob.name_full)
-                self._audit_object(ob, depsgraph.view_layer, where)
+                self._audit_object(ob, where)
         self.progress("exporting", 1.0)
         return objects, lamps
 
-    def _audit_object(self, ob, view_layer, where):
+    def _audit_object(self, ob, where):
         """Name what of an object is another picture and was not carried."""
         view = self.audit.view(ob)
         view.accept(*_CONVEYED)
-        hidden = [kind for kind in _RAYS if not getattr(view, f"visible_{kind}")]
-        if hidden:
-            self.log.warn(where, f"hidden from {' and '.join(hidden)} rays in Blender, visible here")
-        view.accept("visible_camera", "is_holdout", "is_shadow_catcher")
-        if ob.is_holdout or ob.original.holdout_get(view_layer=view_layer):
-            self.log.warn(where, "holdout is left out: the object is seen")
+        view.accept("visible_camera", "is_holdout", "is_shadow_catcher", *(f"visible_{kind}" for kind in lights.RAYS))
         if ob.is_shadow_catcher and ob.type != "LIGHT":  # lights have the flag by default
             self.log.warn(where, "shadow catcher is left out: the object is seen")
         for what in self.audit.leftovers(ob):
@@ -366,6 +371,11 @@ class Job:
         original = ob.original
         if not ob.visible_camera or original.indirect_only_get(view_layer=depsgraph.view_layer):
             entry["visible_to_camera"] = False
+        hidden = lights.hidden_from(ob)
+        if hidden:
+            entry["hidden_from"] = hidden
+        if ob.is_holdout or original.holdout_get(view_layer=depsgraph.view_layer):
+            entry["holdout"] = True
         if uv is None:
             self._check_coordinates(ob, materials, where)
         self._check_tangents(ob, names, where)
@@ -410,13 +420,32 @@ def _rank(matrix):
     return int((values > max(values.max() * 1e-6, 1e-9)).sum())
 
 
-def export(scene, folder, bake=BAKE, bake_size=BAKE_SIZE, layer=None, progress=progress_to_terminal):
-    """Write `scene` to `folder`/scene.yaml; returns the Log. Raises ExportError."""
+def export(scene, folder, bake=BAKE, bake_size=BAKE_SIZE, layer=None, progress=progress_to_terminal, frames=None):
+    """Write `scene` to `folder`/scene.yaml, with a file for each of `frames` if they are named;
+    returns the Log. Raises ExportError."""
     try:
         os.makedirs(folder, exist_ok=True)
+        if frames is not None:
+            return _export_frames(scene, folder, frames, layer, bake=bake, bake_size=bake_size, progress=progress)
         job = Job(scene, folder, bake=bake, bake_size=bake_size, layer=layer, progress=progress)
         job.prepare()
         return _with_depsgraph(scene, layer, job.write)
     except OSError as error:
         raise ExportError(f"{folder} can't be written: {error.strerror or error} "
                           f"({error.filename})" if error.filename else str(error)) from error
+
+
+def _export_frames(scene, folder, frames, layer, **options):
+    current, subframe = scene.frame_current, scene.frame_subframe
+
+    def sections_of(number, beside, log):
+        scene.frame_set(number)
+        job = Job(scene, beside, log=log, layer=layer, **options)
+        job.prepare()
+        return _with_depsgraph(scene, layer, job.frame)
+
+    try:
+        with cycles.quiet_handlers():
+            return export_frames(frames, folder, sections_of)
+    finally:
+        scene.frame_set(current, subframe=subframe)

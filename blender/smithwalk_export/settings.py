@@ -47,6 +47,10 @@ def film(scene, log, view_section=None):
         section["filter"] = {"blackman_harris": {"width": max(cycles.filter_width, 0.01)}}
     if view.exposure(scene) != 0.0:
         section["exposure"] = view.exposure(scene)
+    if cycles.film_exposure != 1.0:
+        section["gain"] = max(cycles.film_exposure, 0.0)
+    if render.film_transparent:
+        section["transparent"] = True
     if view_section:
         section["view"] = view_section
     return section
@@ -126,10 +130,8 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
     for kind in ("reflective", "refractive"):
         if not getattr(cycles, f"caustics_{kind}"):
             log.warn("scene", f"{kind} caustics are off in Blender and are rendered here")
-    if cycles.film_exposure != 1.0:
-        log.warn("scene", f"Cycles' film exposure {cycles.film_exposure:g} is left out (it scales the EXR too)")
-    if render.film_transparent:
-        log.warn("scene", "transparent film is left out: the world is seen")
+    if render.film_transparent and cycles.film_transparent_glass:
+        log.warn("scene", "transparent glass is left out: glass is opaque on a transparent film")
     if render.use_motion_blur:
         log.warn("scene", "motion blur is left out")
     if getattr(cycles, "use_fast_gi", False):

@@ -56,28 +56,34 @@ class WorldWriter:
         plain = self._plain(images)
         view = self.audit.view(self.data)
         view.accept("color", "use_nodes", "node_tree", "cycles.is_caustics_light")
-        camera = getattr(getattr(self.data, "cycles_visibility", None), "camera", True)
+        visibility = getattr(self.data, "cycles_visibility", None)
+        kinds = ("camera", "diffuse", "glossy", "transmission")
+        hidden = [kind for kind in kinds if not getattr(visibility, kind, True)]
+        seen = {"hidden_from": hidden} if hidden else {}
+        view.accept("cycles_visibility")
         for what in self.audit.leftovers(self.data):
             self.log.warn(self.where, f"{what}: left out")
         if plain is not None:
+            for keys in plain.values():
+                keys.update(seen)
             return plain or None, []
         if self.panorama is None:
             rgb = [max(float(c), 0.0) for c in self.data.color]
             self.log.wrong(self.where, "its nodes need a panorama by Cycles, which was not rendered: "
                                        f"the viewport colour {[round(c, 3) for c in rgb]} is written")
-            return {"constant": {"color": rgb}}, []
+            return {"constant": {"color": rgb, **seen}}, []
         pixels, sun = self.panorama
         if self._sees_camera_rays():
             self.log.warn(self.where, "looks different to the camera than to light in Blender: "
                                       "what lights the scene is written")
-        lights = [self._sun(sun, camera)] if sun else []
+        lights = [self._sun(sun, hidden)] if sun else []
         constant = uniform(pixels)
         if constant is not None:
-            return {"constant": {"color": list(constant)}}, lights
+            return {"constant": {"color": list(constant), **seen}}, lights
         rgba = np.ones((*pixels.shape[:2], 4), dtype=np.float32)
         rgba[..., :3] = pixels
         file = images.save(rgba, "world", True, self.where)
-        return {"environment": {"file": file}} if file else None, lights
+        return {"environment": {"file": file, **seen}} if file else None, lights
 
     # A constant, or an image
 
@@ -236,15 +242,18 @@ class WorldWriter:
         return (*direction, *irradiance, angle)
 
     @staticmethod
-    def _sun(sun, camera):
+    def _sun(sun, hidden):
         x, y, z, r, g, b, angle = sun
         strength = max(r, g, b)
         pose = Vector((x, y, z)).to_track_quat("Z", "Y").to_matrix().to_4x4()
         keys = {"name": "Sun disk of the sky", "transform": matrix(pose),
                 "color": [r / strength, g / strength, b / strength],
                 "strength": strength, "angle": math.degrees(angle)}
-        if camera:
+        if "camera" not in hidden:
             keys["visible_to_camera"] = True
+        others = [kind for kind in hidden if kind != "camera"]
+        if others:
+            keys["hidden_from"] = others
         return {"sun": keys}
 
     def _sees_camera_rays(self):

@@ -15,6 +15,8 @@ pub struct Camera {
     pub projection: Projection,
     /// The aperture; a pinhole when absent.
     pub depth_of_field: Option<DepthOfField>,
+    /// Where along the view axis it begins and ends to see, in metres; all of it when absent.
+    pub clip: Option<[f32; 2]>,
 }
 
 /// How directions become pixels.

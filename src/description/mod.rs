@@ -277,6 +277,8 @@ pub struct Object {
     pub visible_to_camera: bool,
     /// Other rays that pass it.
     pub hidden_from: Vec<RayKind>,
+    /// Whether it is a hole in the image: black, and transparent on a transparent film.
+    pub holdout: bool,
 }
 
 impl Object {
@@ -311,6 +313,8 @@ struct RawObject {
     visible_to_camera: bool,
     #[serde(default)]
     hidden_from: Vec<RayKind>,
+    #[serde(default)]
+    holdout: bool,
 }
 
 impl TryFrom<RawObject> for Object {
@@ -330,6 +334,7 @@ impl TryFrom<RawObject> for Object {
             transform: raw.transform,
             visible_to_camera: raw.visible_to_camera,
             hidden_from: raw.hidden_from,
+            holdout: raw.holdout,
         })
     }
 }

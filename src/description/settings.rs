@@ -32,6 +32,10 @@ pub struct Film {
     pub filter: Filter,
     /// In stops; for PNG alone.
     pub exposure: f32,
+    /// A factor on all light, in EXR files too.
+    pub gain: f32,
+    /// Whether the camera sees nothing, in place of the world, and there is an alpha.
+    pub transparent: bool,
     /// How PNGs look; without it plain sRGB.
     pub view: Option<ViewTransform>,
     /// Further images, each once.
@@ -45,6 +49,8 @@ impl Default for Film {
             height: 256,
             filter: Filter::Box {},
             exposure: 0.0,
+            gain: 1.0,
+            transparent: false,
             view: None,
             aovs: Vec::new(),
         }

@@ -8,6 +8,7 @@ use super::{
     Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, ViewTransform,
     World,
 };
+use crate::film::Aov;
 use crate::rays::RayKind;
 use crate::text::excerpt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -354,6 +355,13 @@ impl Check<'_, '_> {
                 at.key("focus_distance"),
             );
         }
+        if let Some([near, far]) = camera.clip {
+            self.number(near, Range::NonNegative, at.key("clip").index(0));
+            if far <= near {
+                let message = format!("expected more than the near plane's {near} m, found {far}");
+                self.report(at.key("clip").index(1), message);
+            }
+        }
     }
 
     fn film(&mut self, film: &Film, at: At) {
@@ -374,6 +382,7 @@ impl Check<'_, '_> {
             Range::Within(-32.0, 32.0),
             at.key("exposure"),
         );
+        self.number(film.gain, Range::NonNegative, at.key("gain"));
         if let Some(ViewTransform { log2, .. }) = &film.view {
             let at = at.key("view").key("log2");
             self.number(log2.offset, Range::NonNegative, at.key("offset"));
@@ -385,6 +394,10 @@ impl Check<'_, '_> {
         }
         let mut seen = BTreeSet::new();
         for (index, aov) in film.aovs.iter().enumerate() {
+            if *aov == Aov::Alpha {
+                let message = "alpha comes with `film.transparent`".to_owned();
+                self.report(at.key("aovs").index(index), message);
+            }
             if !seen.insert(*aov) {
                 self.report(
                     at.key("aovs").index(index),

@@ -25,6 +25,9 @@ pub enum Aov {
     Single,
     /// The rest: what multiple scattering within microsurfaces adds.
     Multiple,
+    /// What a transparent film does not let through: one minus the share of the camera's
+    /// rays that reach the world or a holdout.
+    Alpha,
 }
 
 /// What becomes of an AOV's values.
@@ -41,8 +44,10 @@ pub(super) enum Accumulation {
 /// A row of the table of AOVs.
 pub(super) struct Row {
     pub aov: Aov,
-    /// In scene files and of the layer in EXR files.
+    /// In messages and, but for alpha, scene files.
     pub name: &'static str,
+    /// In EXR files; none stands beside the colour.
+    pub layer: &'static str,
     /// In EXR files.
     pub channels: &'static [&'static str],
     pub accumulation: Accumulation,
@@ -68,6 +73,7 @@ const TABLE: [Row; Aov::COUNT] = {
         Row {
             aov,
             name,
+            layer: name,
             channels,
             accumulation,
             of_first_hit,
@@ -80,12 +86,16 @@ const TABLE: [Row; Aov::COUNT] = {
         row(Aov::Variance, "variance", RGB, OfColor, false),
         row(Aov::Single, "single", RGB, Mean, false),
         row(Aov::Multiple, "multiple", RGB, Mean, false),
+        Row {
+            layer: "",
+            ..row(Aov::Alpha, "alpha", &["A"], Mean, false)
+        },
     ]
 };
 
 impl Aov {
     /// Number of all AOVs.
-    pub const COUNT: usize = Self::Multiple as usize + 1;
+    pub const COUNT: usize = Self::Alpha as usize + 1;
 
     /// All of them, in the order of their layers.
     pub const ALL: [Self; Self::COUNT] = {
@@ -102,7 +112,7 @@ impl Aov {
         &TABLE[self as usize]
     }
 
-    /// The name in scene files and of the layer in EXR files.
+    /// The name in messages and scene files, and but for alpha of the layer in EXR files.
     pub const fn name(self) -> &'static str {
         self.row().name
     }

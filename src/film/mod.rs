@@ -196,7 +196,7 @@ impl Film {
         image.layers = self
             .aovs
             .iter()
-            .map(|aov| Layer::black(aov.name(), aov.row().channels, self.window.area()))
+            .map(|aov| Layer::black(aov.row().layer, aov.row().channels, self.window.area()))
             .collect();
         for tile in &self.tiles {
             for pixel in tile.window().pixels() {
@@ -280,7 +280,8 @@ mod tests {
             .with(Aov::Normal, [0.0, -1.0, 0.0])
             .with(Aov::Depth, [3.0, f32::NAN, 0.0])
             .with(Aov::Single, [0.75; 3])
-            .with(Aov::Multiple, [0.25; 3]);
+            .with(Aov::Multiple, [0.25; 3])
+            .with(Aov::Alpha, [0.5; 3]);
         let mut one_sample = film.clone();
         add(&mut one_sample, &[hit, Sample::default()]);
         add(&mut film, &[hit]);

@@ -25,18 +25,36 @@ impl Display {
     /// The image's colour in 8 bits, row by row. NaN becomes black.
     #[must_use]
     pub fn encode(&self, image: &Image) -> Vec<u8> {
-        let scale = self.exposure.exp2();
-        let pixels = image.color.iter().flat_map(|color| {
-            let scaled = color.map(|c| c * scale);
-            let shown = match &self.lut {
-                Some(lut) => lut.look_up(scaled),
-                None => scaled.map(srgb),
-            };
-            // A cast turns NaN into 0.
-            shown.map(|c| (c * 255.0 + 0.5) as u8)
+        let pixels = image.color.iter().flat_map(|&color| self.show(color));
+        pixels.collect()
+    }
+
+    /// The same with the image's alpha as a fourth channel: the colours are divided by it,
+    /// but for those that shine without covering anything.
+    #[must_use]
+    pub fn encode_with_alpha(&self, image: &Image, alpha: &[f32]) -> Vec<u8> {
+        let pixels = image.color.iter().zip(alpha).flat_map(|(&color, &alpha)| {
+            let whole = if alpha > 0.0 { 1.0 / alpha } else { 1.0 };
+            let [r, g, b] = self.show(color.map(|c| c * whole));
+            [r, g, b, quantise(alpha)]
         });
         pixels.collect()
     }
+
+    fn show(&self, color: [f32; 3]) -> [u8; 3] {
+        let scale = self.exposure.exp2();
+        let scaled = color.map(|c| c * scale);
+        let shown = match &self.lut {
+            Some(lut) => lut.look_up(scaled),
+            None => scaled.map(srgb),
+        };
+        shown.map(quantise)
+    }
+}
+
+fn quantise(share: f32) -> u8 {
+    // A cast cuts off, and turns NaN into 0.
+    (share * 255.0 + 0.5) as u8
 }
 
 /// The sRGB transfer function: linear in, encoded out, both in [0, 1].
@@ -72,5 +90,14 @@ mod tests {
         image.color[0] = [0.25, 0.5, f32::NAN];
         assert_eq!(Display::srgb(1.0).encode(&image), [188, 255, 0]);
         assert_eq!(Display::srgb(2.0).encode(&image), [255, 255, 0]);
+    }
+
+    /// Half covered by 0.214: the colour is that of the whole; what covers nothing shines.
+    #[test]
+    fn colours_are_divided_by_alpha() {
+        let mut image = Image::black([3, 1], Window::full([3, 1]));
+        image.color = vec![[0.107_020_5; 3], [0.214_041; 3], [0.0; 3]];
+        let shown = Display::default().encode_with_alpha(&image, &[0.5, 0.0, 0.0]);
+        assert_eq!(shown, [128, 128, 128, 128, 128, 128, 128, 0, 0, 0, 0, 0]);
     }
 }

@@ -64,6 +64,12 @@ impl Image {
         self.layers.iter().find(|layer| layer.name == name)
     }
 
+    /// The share of each pixel that is covered, which the colour is multiplied by already;
+    /// `None` where all are whole.
+    pub fn alpha(&self) -> Option<&[f32]> {
+        self.layer("")?.channel("A")
+    }
+
     /// The part of the image within `window`, which must lie in its own.
     ///
     /// # Panics

@@ -4,6 +4,9 @@ use std::fs::{self, File};
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use ::image::codecs::png::PngEncoder;
+use ::image::{ExtendedColorType, ImageEncoder};
+
 use super::{Display, Image, exr};
 
 /// Why an image can't be written.
@@ -88,7 +91,7 @@ impl OutputPath {
     }
 
     /// Writes the image: scene-linear with all layers and attributes as EXR;
-    /// the colour alone, as `display` shows it, as PNG. The file is replaced once the
+    /// colour and alpha, as `display` shows them, as PNG. The file is replaced once the
     /// new one is complete.
     ///
     /// # Errors
@@ -103,7 +106,13 @@ impl OutputPath {
             }
             Format::Png => {
                 let size = [image.window.width, image.window.height];
-                self.write_rgb8(&display.encode(image), size)
+                match image.alpha() {
+                    Some(alpha) => {
+                        let pixels = display.encode_with_alpha(image, alpha);
+                        self.write_png(&pixels, size, ExtendedColorType::Rgba8)
+                    }
+                    None => self.write_rgb8(&display.encode(image), size),
+                }
             }
         }
     }
@@ -114,12 +123,19 @@ impl OutputPath {
     /// # Errors
     /// When the system refuses; a file that was there before stays.
     pub fn write_rgb8(&self, pixels: &[u8], size: [u32; 2]) -> Result<(), OutputError> {
-        use ::image::ImageEncoder;
-        let [width, height] = size;
+        self.write_png(pixels, size, ExtendedColorType::Rgb8)
+    }
+
+    fn write_png(
+        &self,
+        pixels: &[u8],
+        [width, height]: [u32; 2],
+        kind: ExtendedColorType,
+    ) -> Result<(), OutputError> {
         let mut bytes = Vec::new();
-        let encoder = ::image::codecs::png::PngEncoder::new(&mut bytes);
+        let encoder = PngEncoder::new(&mut bytes);
         encoder
-            .write_image(pixels, width, height, ::image::ExtendedColorType::Rgb8)
+            .write_image(pixels, width, height, kind)
             .map_err(|error| self.refused(&error))?;
         replace(&self.path, &bytes)
     }

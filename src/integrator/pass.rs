@@ -93,7 +93,7 @@ fn sample<I: Integrator>(
         let (ray, depth_scale) = job.camera_ray::<I>(pixel, film, lens);
         let result = integrator.trace(ray, &mut sampler, draws.split(path));
         rays += u64::from(result.rays);
-        paths.push(result.to_sample(depth_scale));
+        paths.push(result.to_sample(job.settings.gain, depth_scale));
     }
     tile.add(pixel, &paths);
     rays

@@ -122,7 +122,7 @@ impl<const F: u32> PathTracer<'_, F> {
             let hit = self.intersect(path.ray, path.kind);
             let mut emitted = self.lamps(path, hit.map(|hit| hit.t));
             let Some(hit) = hit else {
-                emitted += self.world(path);
+                emitted += self.world(path, found);
                 path.deposit(emitted, &mut found.radiance);
                 return None;
             };
@@ -135,6 +135,14 @@ impl<const F: u32> PathTracer<'_, F> {
                 if path.throughput == Rgb::ZERO {
                     return None;
                 }
+            }
+            if has::<F>(Features::RAY_VISIBILITY)
+                && path.kind == RayKind::Camera
+                && self.scene.objects[surface.object].holdout
+            {
+                path.deposit(emitted, &mut found.radiance);
+                path.see_through(found);
+                return None;
             }
             if has::<F>(Features::EMISSIVE_MESHES) {
                 emitted += self.surface_emission(path, &surface);

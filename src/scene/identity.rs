@@ -47,6 +47,8 @@ pub(super) fn identity(
         height,
         filter,
         exposure: _,
+        gain,
+        transparent,
         view: _,
         aovs: _,
     } = film;
@@ -67,6 +69,8 @@ pub(super) fn identity(
     add("camera".into(), of_value(camera));
     add("resolution".into(), format!("{width} × {height}"));
     add("filter".into(), of_value(filter));
+    add("gain".into(), gain.to_string());
+    add("transparent".into(), transparent.to_string());
     add("seed".into(), seed.to_string());
     add("max_bounces".into(), max_bounces.to_string());
     add("roulette_start".into(), roulette_start.to_string());

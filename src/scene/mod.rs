@@ -92,6 +92,8 @@ pub struct Object {
     pub materials: Vec<usize>,
     /// The rays that meet it.
     pub seen_by: RayKinds,
+    /// Whether it is a hole in the image.
+    pub holdout: bool,
     /// For an emissive object, the number of its first triangle among the
     /// emissive triangles of all objects.
     pub first_emitter: Option<u32>,

@@ -21,7 +21,7 @@ use crate::film::Identity;
 use crate::light::{EmissiveTriangle, Light, Lights, World, resolve_light, resolve_world};
 use crate::memory::Budget;
 use crate::mesh::Mesh;
-use crate::rays::RayKinds;
+use crate::rays::{RayKind, RayKinds};
 use crate::texture::Texture;
 
 /// A scene, and what was mended to get it.
@@ -217,6 +217,10 @@ pub(super) fn build(
         .world
         .as_ref()
         .map_or(RayKinds::ALL, |w| w.seen_by());
+    let world_seen_by = match description.film.transparent {
+        true => world_seen_by.without(RayKind::Camera),
+        false => world_seen_by,
+    };
     let lights = Lights::new(lamps, world, triangles).with_world_seen_by(world_seen_by);
     let mut scene = Scene {
         accelerator,
@@ -428,6 +432,7 @@ impl<'a> Placing<'a> {
             mirrored: determinant < 0.0,
             materials: material_indices,
             seen_by: object.seen_by(),
+            holdout: object.holdout,
             first_emitter: None,
         };
         Ok((runtime, geometry))
@@ -596,7 +601,10 @@ fn features(scene: &Scene) -> Features {
     );
     set.add_if(
         Features::RAY_VISIBILITY,
-        scene.objects.iter().any(|o| o.seen_by != RayKinds::ALL)
+        scene
+            .objects
+            .iter()
+            .any(|o| o.seen_by != RayKinds::ALL || o.holdout)
             || scene.lights.hides_from_scattered()
             || scene.lights.world_seen_by() != RayKinds::ALL,
     );

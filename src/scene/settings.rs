@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use crate::description::{Description, Filter};
-use crate::film::{AovSet, Film, PixelFilter};
+use crate::film::{Aov, AovSet, Film, PixelFilter};
 use crate::image::Window;
 
 /// When to stop. Whatever is reached first counts.
@@ -43,6 +43,8 @@ pub struct RenderSettings {
     pub filter: PixelFilter,
     /// What is kept beside the colour.
     pub aovs: AovSet,
+    /// A factor on all light.
+    pub gain: f32,
     /// Another seed gives another, independent image.
     pub seed: u64,
     /// Indices of the samples that are this render's part of the image.
@@ -74,7 +76,13 @@ impl RenderSettings {
                 Filter::Box {} => PixelFilter::box_filter(),
                 Filter::BlackmanHarris { width } => PixelFilter::blackman_harris(width),
             },
-            aovs: film.aovs.iter().copied().collect(),
+            aovs: film
+                .aovs
+                .iter()
+                .copied()
+                .chain(film.transparent.then_some(Aov::Alpha))
+                .collect(),
+            gain: film.gain,
             seed: sampling.seed,
             share: 0..u32::MAX,
             limits: Limits::samples(sampling.spp),

@@ -1,5 +1,6 @@
 //! Light that BSDF samples find: lamps crossed, surfaces that shine, the world.
 
+use super::result::Found;
 use super::state::Path;
 use super::tracer::PathTracer;
 use crate::color::Rgb;
@@ -20,8 +21,8 @@ impl<const F: u32> PathTracer<'_, F> {
         // Densities are those at the last vertex, so that is where the segment starts.
         let segment = Ray {
             origin: last.receiver.position,
-            t_near: last.travelled,
-            t_far: to_surface.map_or(f32::INFINITY, |t| last.travelled + t),
+            t_near: last.travelled + ray.t_near,
+            t_far: last.travelled + to_surface.unwrap_or(ray.t_far),
             ..*ray
         };
         self.scene.lights.crossed(
@@ -41,9 +42,10 @@ impl<const F: u32> PathTracer<'_, F> {
     }
 
     /// What a ray that leaves the scene brings.
-    pub(super) fn world(&self, path: &Path) -> Rgb {
+    pub(super) fn world(&self, path: &Path, found: &mut Found) -> Rgb {
         let lights = &self.scene.lights;
         if has::<F>(Features::RAY_VISIBILITY) && !lights.world_seen_by().contains(path.kind) {
+            path.see_through(found);
             return Rgb::ZERO;
         }
         let (mut radiance, light_pdf) = lights.world(path.last.receiver, path.ray.direction);

@@ -122,7 +122,7 @@ fn evaluate<const F: u32>(
         let light = path.throughput * sample.arriving.light;
         mean.add(Found {
             radiance: value * (light * (1.0 / EVALUATIONS as f32)),
-            rays: 0,
+            ..Found::default()
         });
     }
 }

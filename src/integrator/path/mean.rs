@@ -26,6 +26,7 @@ impl Mean {
     #[inline]
     pub fn add(&mut self, found: Found) {
         self.sum.radiance += found.radiance;
+        self.sum.let_through += found.let_through;
         self.sum.rays += found.rays;
         if let Some(squares) = &mut self.squares {
             for (sum, found) in squares.iter_mut().zip(found.radiance.total().to_array()) {
@@ -41,11 +42,20 @@ impl Mean {
 
     /// The mean radiance with all rays, and how the samples differ.
     pub fn finish(self) -> (Found, Spread) {
-        let Found { radiance, rays } = self.sum;
+        let Found {
+            radiance,
+            let_through,
+            rays,
+        } = self.sum;
         let spread = self.squares.map_or_else(Spread::default, |squares| {
             Spread::of(self.count, radiance.total().to_array(), squares, rays)
         });
-        let radiance = radiance * Rgb::splat(1.0 / self.count as f32);
-        (Found { radiance, rays }, spread)
+        let share = 1.0 / self.count as f32;
+        let found = Found {
+            radiance: radiance * Rgb::splat(share),
+            let_through: let_through * share,
+            rays,
+        };
+        (found, spread)
     }
 }

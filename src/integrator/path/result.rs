@@ -15,6 +15,8 @@ use super::state::Path;
 pub(super) struct Found {
     /// Radiance, W·m⁻²·sr⁻¹.
     pub radiance: ByOrder,
+    /// The share of the camera's ray that nothing stops, where the world is hidden from it.
+    pub let_through: f32,
     /// Rays traced, shadow rays among them.
     pub rays: u32,
 }
@@ -24,6 +26,8 @@ pub(super) struct Found {
 pub struct PathResult {
     /// Radiance, W·m⁻²·sr⁻¹.
     pub radiance: ByOrder,
+    /// The share of the camera ray that nothing stops, where the world is hidden from it.
+    pub let_through: f32,
     /// What the first surface is, if the camera ray met one and AOVs want it.
     pub first: Option<FirstHit>,
     /// Rays traced, shadow rays among them.
@@ -61,6 +65,7 @@ impl PathResult {
     pub(super) fn of(found: Found) -> Self {
         Self {
             radiance: found.radiance,
+            let_through: found.let_through,
             rays: found.rays,
             ..Self::default()
         }
@@ -69,16 +74,19 @@ impl PathResult {
     /// Adds what a part of the path behind its first surface found.
     pub(super) fn add(&mut self, found: Found) {
         self.radiance += found.radiance;
+        self.let_through += found.let_through;
         self.rays += found.rays;
     }
 
-    /// As the film takes it; `depth_scale` turns the distance along the ray
-    /// into the depth along the view axis.
+    /// As the film takes it; `gain` is a factor on the light, `depth_scale` turns the
+    /// distance along the ray into the depth along the view axis.
     #[must_use]
-    pub fn to_sample(self, depth_scale: f32) -> Sample {
-        let sample = Sample::of(self.radiance.total().to_array())
-            .with(Aov::Single, self.radiance.single.to_array())
-            .with(Aov::Multiple, self.radiance.multiple.to_array());
+    pub fn to_sample(self, gain: f32, depth_scale: f32) -> Sample {
+        let light = |light: Rgb| (light * gain).to_array();
+        let sample = Sample::of(light(self.radiance.total()))
+            .with(Aov::Single, light(self.radiance.single))
+            .with(Aov::Multiple, light(self.radiance.multiple))
+            .with(Aov::Alpha, [1.0 - self.let_through; 3]);
         match self.first {
             Some(first) => sample
                 .with(Aov::Albedo, first.albedo.to_array())

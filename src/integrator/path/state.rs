@@ -1,6 +1,7 @@
 //! A path on its way.
 
 use super::media::Media;
+use super::result::Found;
 use crate::bsdf::ByOrder;
 use crate::color::Rgb;
 use crate::embree::Ray;
@@ -65,7 +66,18 @@ impl Path {
     pub fn pass_through(&mut self, surface: &Surface) {
         self.vertex += 1;
         self.last.travelled += self.to_surface;
-        self.ray = surface.spawn(self.ray.direction);
+        let t_far = self.ray.t_far - self.to_surface;
+        self.ray = Ray {
+            t_far,
+            ..surface.spawn(self.ray.direction)
+        };
+    }
+
+    /// Nothing is there: what the camera's ray carries is what the film lets through.
+    pub fn see_through(&self, found: &mut Found) {
+        if self.kind == RayKind::Camera {
+            found.let_through += self.throughput.element_sum() / 3.0;
+        }
     }
 
     /// Who looks at the surface that the ray meets.
