@@ -154,11 +154,13 @@ def report(path, title, said, log, pictures, arrays):
         if entries:
             lines = "".join(f"<li>{html.escape(str(e))}</li>" for e in entries)
             groups.append(f"<h3>{name} ({len(entries)})</h3><ul>{lines}</ul>")
-    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "report.html"), encoding="utf-8") as f:
+    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "src", "cli", "diff", "report.html"),
+              encoding="utf-8") as f:
         page = f.read()
     for key, value in {
         "TITLE": html.escape(title), "SENTENCE": html.escape(said), "WIDTH": str(width), "HEIGHT": str(height),
-        "WARNINGS": "".join(groups) or "<p>Everything was carried.</p>",
+        "NOTES": "<h2>What the export said</h2>" + ("".join(groups) or "<p>Everything was carried.</p>"),
+        "A": "smithwalk", "B": "Cycles", "FULL": "the mean brightness", "FULL_Z": "4", "Z": "",
         **{f"IMAGE_{k.upper()}": embed(p) for k, p in pictures.items()},
         **{f"FLOATS_{k.upper()}": floats(a) for k, a in arrays.items()},
     }.items():

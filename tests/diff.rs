@@ -215,3 +215,25 @@ fn infinite_pixels_fail_whatever_the_bounds() {
     assert_eq!(code(&output), 1);
     assert_eq!(json(&output)["non_finite_pixels"], 1);
 }
+
+/// One file: both images, their values and the figures; names from files are text alone.
+#[test]
+fn the_page_holds_all_of_the_comparison() {
+    let a = File::new("<b>ours.exr", &grey(0.5));
+    let b = File::new("theirs.exr", &grey(0.25));
+    let page = temporary("report.html");
+    let output = diff(&[a.name(), b.name(), "--html", page.to_str().unwrap()]);
+    assert_eq!(code(&output), 0);
+    let text = std::fs::read_to_string(&page).unwrap();
+    std::fs::remove_file(&page).unwrap();
+    assert!(!text.contains("{{") && !text.contains("<b>"));
+    assert!(text.contains("100.000 % brighter than"), "the sentence");
+    assert_eq!(
+        text.matches("data:image/png;base64,").count(),
+        3,
+        "two images and a map"
+    );
+    // 0.5 as floats, little end first, three times and a quarter of the fourth.
+    assert!(text.contains("AAAAPwAAAD8AAAA/"));
+    assert!(!text.contains("http"), "nothing is fetched");
+}

@@ -27,6 +27,7 @@ from .scene import CACHED, ExportError, Job
 ENGINE = "SMITHWALK"
 _POLL = 0.1          # seconds between looks at the process
 _TO_STOP = 1.5       # seconds that a cancelled process has to end by itself
+_PARTIAL = 5         # seconds between partial images
 _REPORTED = 12       # warnings shown in Blender; the others are in the terminal
 # Name in Blender, key in the scene file, channels' names, kind.
 PASSES = (
@@ -144,9 +145,16 @@ class SmithwalkEngine(bpy.types.RenderEngine):
             command += ["-D", "film.aovs=[" + ", ".join(key for _, key, _, _ in passes) + "]"]
         if scene.render.threads_mode == "FIXED":
             command += ["--threads", str(scene.render.threads)]
-        if _takes_progress(command[0]):
-            command += ["--progress", "json"]
-        ended = self._run(command, layer.name)
+        command += ["--progress", "json", "--checkpoint", str(_PARTIAL)]
+
+        def partial():
+            """The image of the checkpoint that was just saved."""
+            shown = os.path.join(folder, "partial.exr")
+            done = subprocess.run([command[0], "merge", out + ".film", "-o", shown], capture_output=True, check=False)
+            if done.returncode == 0:
+                self._hand_over(shown, layer.name, width, height, passes)
+
+        ended = self._run(command, layer.name, partial)
         if ended is not None:
             self._fail(ended)
         if os.path.isfile(out):
@@ -160,23 +168,28 @@ class SmithwalkEngine(bpy.types.RenderEngine):
             self.report({"WARNING"}, f"smithwalk: {len(losses) - _REPORTED} more differences, see the terminal")
         print(log.summary())
 
-    def _run(self, command, layer):
-        """Run the program to its end; an error's text, or None. Cancelling stops it."""
-        started = time.monotonic()
+    def _run(self, command, layer, partial):
+        """Run the program to its end; an error's text, or None. Cancelling stops it.
+
+        `partial` is called after each checkpoint.
+        """
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                    encoding="utf-8", errors="replace")
         lines, readers = [], []
         for pipe in (process.stdout, process.stderr):
             readers.append(threading.Thread(target=lambda pipe=pipe: lines.extend(iter(pipe.readline, "")), daemon=True))
             readers[-1].start()
-        shown = 0
+        shown, checkpoint = 0, None
         while process.poll() is None:
             if self.test_break():
                 _stop(process)
                 break
             while shown < len(lines):
-                self._show(lines[shown], layer, started)
+                latest = self._show(lines[shown], layer)
                 shown += 1
+                if latest is not None and latest != checkpoint:
+                    checkpoint = latest
+                    partial()
             time.sleep(_POLL)
         for reader in readers:
             reader.join(timeout=1.0)
@@ -185,20 +198,21 @@ class SmithwalkEngine(bpy.types.RenderEngine):
         said = [line.strip() for line in lines if line.strip() and not line.startswith("{")]
         return " ".join(said[-5:])[:500] or f"the program ended with {process.returncode}"
 
-    def _show(self, line, layer, started):
-        """Progress: a JSON object per line."""
+    def _show(self, line, layer):
+        """Progress: a JSON object per line. Returns when the last checkpoint was, if there was one."""
         if not line.startswith("{"):
-            return
+            return None
         try:
             said = json.loads(line)
         except ValueError:
-            return
-        share = said.get("progress", said.get("fraction"))
-        if isinstance(share, (int, float)) and share > 0.0:
-            self.update_progress(min(float(share), 1.0))
-            left = (time.monotonic() - started) * (1.0 - share) / share
-            text = f"smithwalk: {said.get('spp', '?')} samples, {left:.0f} s left"
-            self.update_stats(layer, text)
+            return None
+        spp, target, left = said["spp"], said["target"], said["eta"]
+        self.update_progress(min(spp / target, 1.0))
+        text = f"smithwalk: {spp:.0f} of {target} samples"
+        if said["noise"] is not None:
+            text += f", noise {said['noise']:.3g}"
+        self.update_stats(layer, text if left is None else f"{text}, {left:.0f} s left")
+        return said["checkpoint"]
 
     def _hand_over(self, path, layer, width, height, passes):
         """Give the file's pixels to Blender, bit for bit."""
@@ -238,17 +252,6 @@ def _stop(process):
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-
-
-_PROGRESS = {}
-
-
-def _takes_progress(program):
-    """Whether the program can say how far it is as JSON."""
-    if program not in _PROGRESS:
-        said = subprocess.run([program, "render", "--help"], capture_output=True, text=True, check=False)
-        _PROGRESS[program] = "--progress" in said.stdout
-    return _PROGRESS[program]
 
 
 class SMITHWALK_OT_bake(bpy.types.Operator):

@@ -1,11 +1,15 @@
 //! `smithwalk diff`: how far an image is from its reference.
 
+mod html;
+
+use std::borrow::Cow;
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use smithwalk::image::{OutputPath, read_exr};
+use smithwalk::image::{OutputPath, check_output, read_exr, replace};
 use smithwalk::metrics::{
     Comparison, DifferenceMap, FALSE_ALARM_RATE, OUTLIER, Outliers, Pair, ZTest,
 };
@@ -28,6 +32,9 @@ pub struct Args {
     /// than B, red where it is brighter; with --z, z-scores
     #[arg(long, value_name = "MAP.png")]
     out: Option<PathBuf>,
+    /// Write a page with both images, maps, pixel values and figures: one file
+    #[arg(long, value_name = "REPORT.html")]
+    html: Option<PathBuf>,
     /// Largest relative bias to accept, as in 0.005 for 0.5 %
     #[arg(long, value_name = "X", value_parser = bound, allow_negative_numbers = true)]
     max_rel_bias: Option<f64>,
@@ -72,6 +79,7 @@ struct Report<'a> {
 /// Compares, prints to `out` and says by the exit code whether all bounds hold.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<ExitCode> {
     let map_path = args.out.as_deref().map(map_path).transpose()?;
+    args.html.as_deref().map(check_output).transpose()?;
     let (a, b) = (read_exr(&args.a)?, read_exr(&args.b)?);
     let pair = Pair::new(&a, &b)
         .with_context(|| format!("{} against {}", args.a.display(), args.b.display()))?;
@@ -80,6 +88,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<ExitCode> {
         figures.z = Some(pair.z_test()?);
     }
     let failures = failures(args, &figures);
+    if let Some(path) = &args.html {
+        let page = html::page(&pair, &figures, names(&args.a, &args.b), args.exposure)?;
+        replace(path, page.as_bytes())?;
+    }
     if args.json {
         let report = Report {
             a: &args.a,
@@ -107,6 +119,15 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<ExitCode> {
         true => ExitCode::SUCCESS,
         false => ExitCode::from(1),
     })
+}
+
+/// What the images are called on the page: by their files' names, or their paths where
+/// those are alike.
+fn names<'a>(a: &'a Path, b: &'a Path) -> [Cow<'a, str>; 2] {
+    match [a, b].map(|path| path.file_stem().map(OsStr::to_string_lossy)) {
+        [Some(a), Some(b)] if a != b => [a, b],
+        _ => [a, b].map(Path::to_string_lossy),
+    }
 }
 
 /// Checks the name and the folder of the map before anything is read.

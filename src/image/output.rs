@@ -5,7 +5,7 @@ use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use ::image::codecs::png::PngEncoder;
-use ::image::{ExtendedColorType, ImageEncoder};
+use ::image::{ExtendedColorType, ImageEncoder, ImageError};
 
 use super::{Display, Image, exr};
 
@@ -129,14 +129,10 @@ impl OutputPath {
     fn write_png(
         &self,
         pixels: &[u8],
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         kind: ExtendedColorType,
     ) -> Result<(), OutputError> {
-        let mut bytes = Vec::new();
-        let encoder = PngEncoder::new(&mut bytes);
-        encoder
-            .write_image(pixels, width, height, kind)
-            .map_err(|error| self.refused(&error))?;
+        let bytes = png(pixels, size, kind).map_err(|error| self.refused(&error))?;
         replace(&self.path, &bytes)
     }
 
@@ -146,6 +142,24 @@ impl OutputPath {
             reason: error.to_string(),
         }
     }
+}
+
+/// A PNG file of 8-bit sRGB of the given width and height.
+///
+/// # Errors
+/// When there are not so many pixels.
+pub fn encode_png(pixels: &[u8], size: [u32; 2]) -> Result<Vec<u8>, ImageError> {
+    png(pixels, size, ExtendedColorType::Rgb8)
+}
+
+fn png(
+    pixels: &[u8],
+    [width, height]: [u32; 2],
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>, ImageError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes).write_image(pixels, width, height, kind)?;
+    Ok(bytes)
 }
 
 /// Whether a file can be written at `path`: makes its folder if there is none and

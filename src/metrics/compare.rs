@@ -116,6 +116,12 @@ impl Pair {
         Ok(Self { a, b, variance })
     }
 
+    /// Image and reference, cut to what both have.
+    #[must_use]
+    pub fn images(&self) -> [&Image; 2] {
+        [&self.a, &self.b]
+    }
+
     /// The pixels that are compared.
     pub fn window(&self) -> Window {
         self.a.window

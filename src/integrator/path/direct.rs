@@ -188,7 +188,7 @@ impl<const F: u32> PathTracer<'_, F> {
             media.cross(self.scene, surface);
         }
         for _ in 0..MAX_STRAIGHT {
-            let Some(hit) = self.scene.accelerator.intersect(ray) else {
+            let Some(hit) = self.intersect(ray, RayKind::Shadow) else {
                 radiance *= media.transmittance(ray.t_far);
                 return (radiance.max_element() > 0.0).then_some(radiance);
             };
