@@ -342,7 +342,8 @@ impl Shot<'_> {
         match denoised {
             Some(Ok(color)) => {
                 image.color = color;
-                image.layers.clear();
+                // The alpha stays, without a name of its own.
+                image.layers.retain(|layer| layer.name.is_empty());
                 write(&outputs.denoised, &image);
             }
             Some(Err(error)) => failed = Some(error.into()),

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use serde_json::json;
 use smithwalk::description::Estimator;
-use smithwalk::image::{OutputPath, check_output, replace};
+use smithwalk::image::{Display, OutputPath, check_output, replace};
 use smithwalk::tables::{AngleTable, Angles, Rgl, Source, merl, rgl};
 
 use super::MaterialArgs;
@@ -117,7 +117,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<()> {
         }
         match format {
             Format::Npz => replace(path, &angles().npz(&texts).context("the archive")?)?,
-            Format::Exr => OutputPath::new(path)?.write(&angles().image(&texts), 0.0)?,
+            Format::Exr => {
+                OutputPath::new(path)?.write(&angles().image(&texts), &Display::default())?
+            }
             Format::Rgl => replace(path, &rgl(&source, args.rgl, &args.material.material)?)?,
             Format::Merl => replace(path, &merl(&source)?)?,
         }
