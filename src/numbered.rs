@@ -4,6 +4,9 @@ use crate::text::excerpt;
 use serde::Deserialize;
 use std::path::PathBuf;
 
+/// More than numbers of frames have, and less than file names may.
+const MOST_DIGITS: usize = 32;
+
 /// A file name with one row of `#`, which stands for the number of a frame: padded
 /// with zeros to as many digits as there are `#`, as in Blender's output paths.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -16,7 +19,7 @@ pub struct Numbered {
 
 /// A name in which it is not clear where the number goes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("expected one row of # where the number of the frame goes, as in frame_####, found `{}`", excerpt(.0))]
+#[error("expected one row of at most 32 # where the number of the frame goes, as in frame_####, found `{}`", excerpt(.0))]
 pub struct NotNumbered(String);
 
 impl Numbered {
@@ -28,7 +31,7 @@ impl Numbered {
             (start, name.len() - start - after.len(), after)
         });
         match found {
-            Some((start, digits, after)) if !after.contains('#') => Ok(Self {
+            Some((start, digits @ ..=MOST_DIGITS, after)) if !after.contains('#') => Ok(Self {
                 before: name[..start].to_owned(),
                 digits,
                 after: after.to_owned(),
@@ -74,8 +77,9 @@ mod tests {
             assert_eq!(name.at(frame), PathBuf::from(path));
         }
         assert_eq!(Numbered::new("#").unwrap().at(3), PathBuf::from("3"));
-        for wrong in ["", "frames.yaml", "#/f_#.yaml"] {
-            assert!(Numbered::new(wrong).is_err(), "{wrong}");
+        for wrong in ["", "frames.yaml", "#/f_#.yaml", &"#".repeat(100_000)] {
+            let error = Numbered::new(wrong).unwrap_err();
+            assert!(error.to_string().len() < 300, "{error}");
         }
     }
 }
