@@ -148,8 +148,9 @@ def main():
             wall, cpu, peak = measure([args.smithwalk, "render", scene, "--spp", "1",
                                         "-o", os.path.join(folder, "a.exr")])
         ready = told["start_up_seconds"]
-        print(f"| {count:,} {label} | {size / 1e6:.0f} | {ready:.1f} | {wall:.1f} | {cpu:.1f} | {peak / 1e6:.0f} "
-              f"| {peak / count:.0f} | {told['memory'] / 1e6:.0f} |".replace(",", " "), flush=True)
+        number = f"{count:,}".replace(",", " ")
+        print(f"| {number} {label} | {size / 1e6:.0f} | {ready:.1f} | {wall:.1f} | {cpu:.1f} | {peak / 1e6:.0f} "
+              f"| {peak / count:.0f} | {told['memory'] / 1e6:.0f} |", flush=True)
 
 
 if __name__ == "__main__":
