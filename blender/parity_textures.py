@@ -174,3 +174,67 @@ def texture_alpha_asked(scene):
     tree = lookup.id_data
     emission = next(n for n in tree.nodes if n.type == "EMISSION")
     tree.links.new(lookup.outputs["Alpha"], emission.inputs["Strength"])
+
+
+# Bump
+
+def bumpy(mat, node, interpolation="Cubic", **inputs):
+    """Feeds the node's normal with a height texture."""
+    tree = mat.node_tree
+    lookup, bump = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeBump")
+    lookup.image, lookup.interpolation = image("heights", np.random.default_rng(4).random((8, 8, 1)).repeat(3, 2)), \
+        interpolation
+    for name, value in inputs.items():
+        bump.inputs[name].default_value = value
+    tree.links.new(lookup.outputs["Color"], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    return bump
+
+
+@case("Bump from a texture of heights that is mirrored, on a stretched and mirrored object")
+def bump(scene):
+    mat, node = diffuse()
+    bumpy(mat, node, Distance=0.1)
+    dome(scene, mat)
+
+
+@case("As bump, inverted, by half, over a normal map")
+def bump_on_normal_map(scene):
+    mat, node = diffuse()
+    normal_mapped(mat, node, strength=0.5)
+    below = node.inputs["Normal"].links[0].from_socket
+    over = bumpy(mat, node, Distance=0.1, Strength=0.5)
+    over.invert = True
+    mat.node_tree.links.new(below, over.inputs["Normal"])
+    dome(scene, mat)
+
+
+# What vertices have
+
+@case("A texture on a second UV map, another on the active one")
+def texture_uv_maps(scene):
+    lookup = shining(scene, cells())
+    ground = bpy.data.objects["Ground"]
+    second = ground.data.uv_layers.new(name="Second")
+    uv = np.random.default_rng(8).random(len(second.data) * 2).astype(np.float32)
+    second.data.foreach_set("uv", uv)
+    tree = lookup.id_data
+    other, coordinates = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeUVMap")
+    other.image, coordinates.uv_map = cells(seed=9), "Second"
+    emission = next(n for n in tree.nodes if n.type == "EMISSION")
+    tree.links.new(coordinates.outputs[0], other.inputs[0])
+    tree.links.new(other.outputs["Color"], emission.inputs["Strength"])
+
+
+@case("Colours of corners, stored as bytes")
+def vertex_colors(scene):
+    lookup = shining(scene, cells())
+    ground = bpy.data.objects["Ground"]
+    layer = ground.data.color_attributes.new("Paint", "BYTE_COLOR", "CORNER")
+    values = np.random.default_rng(8).random(len(layer.data) * 4).astype(np.float32)
+    layer.data.foreach_set("color", values)
+    tree = lookup.id_data
+    paint = tree.nodes.new("ShaderNodeVertexColor")
+    paint.layer_name = "Paint"
+    emission = next(n for n in tree.nodes if n.type == "EMISSION")
+    tree.links.new(paint.outputs["Color"], emission.inputs["Color"])

@@ -279,6 +279,51 @@ class ExportTest(unittest.TestCase):
         self.assertTrue(os.path.isfile(self.path("cells.png")))
         self.assertEqual(self.losses(), [])
 
+    def test_normals(self):
+        """A normal map on a named UV map that is not the active one, and bump on it."""
+        image = bpy.data.images.new("hills", 4, 4)
+        image.pack()
+        image.colorspace_settings.name = "Non-Color"
+        mat, node = self.surface("ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
+        bpy.context.object.data.uv_layers.new(name="Second")
+        tree = mat.node_tree
+        lookup, normal, bump, uv = (tree.nodes.new(n) for n in (
+            "ShaderNodeTexImage", "ShaderNodeNormalMap", "ShaderNodeBump", "ShaderNodeUVMap"))
+        lookup.image, uv.uv_map, normal.uv_map = image, "Second", "Second"
+        normal.inputs["Strength"].default_value = 0.5
+        bump.inputs["Distance"].default_value = 0.25
+        tree.links.new(uv.outputs[0], lookup.inputs[0])
+        tree.links.new(lookup.outputs["Color"], normal.inputs["Color"])
+        tree.links.new(lookup.outputs["Color"], bump.inputs["Height"])
+        tree.links.new(normal.outputs[0], bump.inputs["Normal"])
+        tree.links.new(bump.outputs[0], node.inputs["Normal"])
+        self.export()
+        self.assertEqual(self.line("hills:"), "hills: {file: hills.png, color_space: non_color, uv_map: Second}")
+        width = "" if "Filter Width" in bump.inputs else ", filter_width: 1"
+        self.assertEqual(self.line("test:"), "test: {diffuse: {color: 0.5, normal: {texture: hills, strength: 0.5}, "
+                                             f"bump: {{texture: hills, distance: 0.25{width}}}}}}}")
+        self.assertEqual(self.losses(), [])
+        with open(self.path("cube_second.obj"), encoding="ascii") as f:
+            kinds = [line.split()[0] for line in f]
+        self.assertEqual((kinds.count("v"), kinds.count("f")), (8, 6))
+
+    def test_vertex_colors(self):
+        """Colours of corners: a file beside the mesh, linear."""
+        mat, node = self.surface("ShaderNodeBsdfDiffuse")
+        layer = bpy.context.object.data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER")
+        for i, corner in enumerate(layer.data):
+            corner.color = (i / 32.0, 0.5, 0.25, 1.0)
+        paint = mat.node_tree.nodes.new("ShaderNodeVertexColor")
+        paint.layer_name = "Paint"
+        mat.node_tree.links.new(paint.outputs["Color"], node.inputs["Color"])
+        self.export()
+        self.assertEqual(self.line("paint:"), "paint: {colors: Paint, color_space: linear}")
+        self.assertEqual(self.line("cube:"), "cube: {file: cube.obj, colors: {Paint: cube_paint.obj}}")
+        with open(self.path("cube_paint.obj"), encoding="ascii") as f:
+            colors = {tuple(map(float, line.split()[4:])) for line in f if line.startswith("v ")}
+        self.assertEqual(colors, {(i / 32.0, 0.5, 0.25) for i in range(24)})
+        self.assertEqual(self.losses(), [])
+
     def test_principled(self):
         """The node's sockets as they are; what has the node's default is left out."""
         _, node = self.surface("ShaderNodeBsdfPrincipled", Base_Color=(1.0, 0.75, 0.25), Metallic=1.0,

@@ -29,6 +29,23 @@ pub struct Camera {
     clip: [f32; 2],
 }
 
+/// How wide a pixel is along a ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cone {
+    /// Where the ray starts, metres.
+    pub width: f32,
+    /// What it widens by per metre.
+    pub spread: f32,
+}
+
+impl Cone {
+    /// The width so far along the ray, metres.
+    #[must_use]
+    pub fn at(&self, distance: f32) -> f32 {
+        self.width + self.spread * distance
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Lens {
     /// Metres.
@@ -161,6 +178,27 @@ impl Camera {
             t_near,
             t_far,
             ..Ray::new(origin, direction)
+        }
+    }
+
+    /// How wide a pixel is where its rays in a direction (unit length) start, metres,
+    /// and by how much it widens per metre: the mean of its two sides.
+    #[must_use]
+    pub fn cone(&self, direction: Vec3) -> Cone {
+        let sides = [self.right * self.pixel.x, self.up * self.pixel.y];
+        let mean = |length: &dyn Fn(Vec3) -> f32| sides.map(length).iter().sum::<f32>() / 2.0;
+        if self.parallel {
+            return Cone {
+                width: mean(&|side| side.length()),
+                spread: 0.0,
+            };
+        }
+        // A step on the plane one metre before the eye turns the direction.
+        let nearness = direction.dot(self.forward);
+        let turn = |side: Vec3| (side - direction * direction.dot(side)).length() * nearness;
+        Cone {
+            width: 0.0,
+            spread: mean(&turn),
         }
     }
 

@@ -68,6 +68,10 @@ features! {
     QUADRATIC = 23, "quadratic normals", "a third distribution in every rough closure";
     /// Normals out of textures.
     NORMAL_MAPS = 24, "normal maps", "tangents in memory, a normal per closure";
+    /// UV maps beside meshes' first ones, and colours of vertices.
+    ATTRIBUTES = 25, "UV maps and vertex colours", "what they say of each vertex in memory, an interpolation per look-up";
+    /// How wide the surface is that a pixel sees.
+    FOOTPRINTS = 26, "footprints", "a cone along each path";
 }
 
 impl Features {

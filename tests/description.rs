@@ -133,19 +133,19 @@ fn what_is_left_out_has_the_documented_default() {
 
     let text = "smithwalk: 1\ntextures: {t: {file: t.png}}";
     assert_eq!(
-        read(text).textures["t"].color_space,
-        shown.textures["scratches"].color_space
+        read(text).textures["t"].image().unwrap().color_space,
+        shown.textures["scratches"].image().unwrap().color_space
     );
     assert_eq!(
-        read(text).textures["t"].interpolation,
-        shown.textures["scratches"].interpolation
+        read(text).textures["t"].image().unwrap().interpolation,
+        shown.textures["scratches"].image().unwrap().interpolation
     );
     let placing = Placing::Parts {
         scale: [1.0; 2],
         rotation: 0.0,
         offset: [0.0; 2],
     };
-    assert_eq!(read(text).textures["t"].placing, placing);
+    assert_eq!(read(text).textures["t"].image().unwrap().placing, placing);
 
     let scene = read(
         "smithwalk: 1\nlights: [point: {power: 1}, spot: {power: 2}, sun: {strength: 3}]\n\
@@ -282,8 +282,14 @@ fn materials_take_every_documented_key() {
         "smithwalk: 1\ntextures: {t: {file: t.png, color_space: srgb, interpolation: closest}}\n\
          materials:\n  m: {dielectric: {roughness: {texture: t, channel: g}, ior: 0.75, color: {texture: t}}}",
     );
-    assert_eq!(scene.textures["t"].color_space, ColorSpace::Srgb);
-    assert_eq!(scene.textures["t"].interpolation, Interpolation::Closest);
+    assert_eq!(
+        scene.textures["t"].image().unwrap().color_space,
+        ColorSpace::Srgb
+    );
+    assert_eq!(
+        scene.textures["t"].image().unwrap().interpolation,
+        Interpolation::Closest
+    );
     let Material::Dielectric(glass) = &scene.materials["m"] else {
         panic!("expected a dielectric")
     };

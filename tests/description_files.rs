@@ -140,6 +140,7 @@ fn what_is_not_there_takes_no_memory() {
         Wanted {
             uvs: false,
             normals: false,
+            colors: false,
         },
     );
     assert_eq!(
@@ -151,6 +152,7 @@ fn what_is_not_there_takes_no_memory() {
         Wanted {
             uvs: true,
             normals: false,
+            colors: false,
         },
     );
     assert_eq!((with_uvs.positions.len(), with_uvs.normals), (7, None));
@@ -297,7 +299,7 @@ proptest! {
             text.splice(start..end, replacement.chars());
         }
         let text: String = text.into_iter().collect();
-        match Mesh::read(std::io::Cursor::new(text.as_bytes()), "mesh.obj", Wanted { uvs, normals }) {
+        match Mesh::read(std::io::Cursor::new(text.as_bytes()), "mesh.obj", Wanted { uvs, normals, colors: false }) {
             Ok((mesh, _)) => {
                 let count = mesh.positions.len();
                 prop_assert!(mesh.positions.iter().flatten().all(|x| x.is_finite()));

@@ -23,6 +23,7 @@ mod frames;
 mod heightfield;
 mod inputs;
 mod layers;
+mod leadr;
 mod light;
 mod parity;
 mod relief;

@@ -1,4 +1,4 @@
-//! Normals out of textures.
+//! Normals out of textures of normals and of heights.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use glam::{Mat3, Vec3};
 use smithwalk::description::Description;
 use smithwalk::embree::Ray;
 use smithwalk::features::Features;
-use smithwalk::scene::{Scene, View, resolve};
+use smithwalk::scene::{Scene, Surface, View, resolve};
 
 /// Files of a test.
 struct Folder(PathBuf);
@@ -44,19 +44,26 @@ fn stored() -> Vec3 {
     Vec3::from(STORED.map(|c| f32::from(c) / 255.0 * 2.0 - 1.0))
 }
 
-/// The shading normal where the z axis meets the scene, from above or from below.
-fn normal(scene: &Scene, from_above: bool) -> Vec3 {
+/// Where the z axis meets the scene, from above or from below, and who looks.
+fn look(scene: &Scene, from_above: bool) -> (Surface, View) {
     let down = if from_above { -1.0 } else { 1.0 };
     let ray = Ray::new(Vec3::new(0.0, 0.0, -down * 9.0), Vec3::new(0.0, 0.0, down));
     let hit = scene
         .accelerator
         .intersect(ray)
         .expect("something is there");
-    let surface = scene.surface::<{ Features::EVERYTHING.bits() }>(&ray, &hit);
+    let mut surface = scene.surface::<{ Features::EVERYTHING.bits() }>(&ray, &hit);
+    surface.footprint = 0.01;
     let view = View {
         wo: -ray.direction,
         camera: true,
     };
+    (surface, view)
+}
+
+/// The shading normal there.
+fn normal(scene: &Scene, from_above: bool) -> Vec3 {
+    let (surface, view) = look(scene, from_above);
     scene.normal(&surface, view)
 }
 
@@ -162,7 +169,7 @@ fn missing_texture_coordinates_are_told() {
         .expect_err("no coordinates")
         .to_string();
     let expected = "scene.yaml:4:55: materials.m.mix.b.conductor.normal: \
-                    this needs texture coordinates, and the mesh `bare` of Ball has none";
+                    this needs texture coordinates, which the mesh `bare` of Ball lacks";
     assert!(error.ends_with(expected), "{error}");
 }
 
@@ -198,4 +205,88 @@ fn mistakes_are_told_at_their_place() {
         error.to_string().contains("unknown key `normal`"),
         "{error}"
     );
+}
+
+const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+                    f 1/1 2/2 3/3 4/4\n";
+
+/// Heights that rise by 1 over the 2 m of the square: slopes of one half times the
+/// distance, on both sides towards the viewer.
+#[test]
+fn bump_leans_by_the_slope_of_heights() {
+    let folder = Folder::new("bump");
+    folder.write("quad.obj", QUAD);
+    let heights = |x: u32, _: u32| image::Luma([(f64::from(x) + 0.5) / 256.0 * 65535.0]);
+    let heights = image::ImageBuffer::from_fn(256, 1, |x, y| {
+        let image::Luma([height]) = heights(x, y);
+        image::Luma([height.round() as u16])
+    });
+    heights.save(folder.0.join("h.png")).unwrap();
+    folder.color("n.png", STORED);
+    let at = |keys: &str, above| {
+        let scene = folder.scene(&format!(
+            "smithwalk: 1\n\
+             textures: {{h: {{file: h.png}}, n: {{file: n.png}}}}\n\
+             materials: {{m: {{conductor: {{{keys}}}}}}}\n\
+             meshes: {{quad: {{file: quad.obj}}}}\n\
+             objects: [{{mesh: quad, material: m, transform: {{rotation: [0, 0, 90]}}}}]\n"
+        ));
+        normal(&scene, above)
+    };
+    let close = |a: Vec3, b: Vec3| assert!((a - b.normalize()).length() < 2e-3, "{a} {b}");
+    // The square is turned: u runs along y.
+    let leant = Vec3::new(0.0, -0.2, 1.0);
+    close(at("bump: {texture: h, distance: 0.4}", true), leant);
+    let below = Vec3::new(0.0, -0.2, -1.0);
+    close(at("bump: {texture: h, distance: 0.4}", false), below);
+    let deep = Vec3::new(0.0, 0.2, 1.0);
+    close(
+        at("bump: {texture: h, distance: 0.4, invert: true}", true),
+        deep,
+    );
+    let half = leant.normalize() + Vec3::Z;
+    close(
+        at("bump: {texture: h, distance: 0.4, strength: 0.5}", true),
+        half,
+    );
+    let wide = "bump: {texture: h, distance: 0.4, filter_width: 4, channel: r}";
+    close(at(wide, true), leant);
+    // On top of a normal map: along the surface that this gives.
+    let n = stored();
+    let mapped = Vec3::new(-n.y, n.x, n.z).normalize();
+    // The heights rise along y alone.
+    let turn = Vec3::X.dot(Vec3::Y.cross(mapped));
+    let both = mapped * turn - mapped.cross(Vec3::X) * 0.2;
+    let found = at(
+        "normal: {texture: n}, bump: {texture: h, distance: 0.4}",
+        true,
+    );
+    close(found, both);
+}
+
+#[test]
+fn mistakes_in_heights_are_told_at_their_place() {
+    for (keys, expected) in [
+        ("texture: hh", "there is no texture `hh`; did you mean `h`?"),
+        (
+            "texture: h, distance: -1",
+            "expected a number, 0 or more, found -1",
+        ),
+        (
+            "texture: h, filter_width: 0",
+            "expected a number above 0 and up to 16, found 0",
+        ),
+        ("texture: h, depth: 1", "unknown key `depth`"),
+    ] {
+        let text = format!(
+            "smithwalk: 1\ntextures: {{h: {{file: h.png}}}}\n\
+             materials: {{m: {{diffuse: {{bump: {{{keys}}}}}}}}}\n"
+        );
+        let error = Description::from_str(&text, "scene", &[]).expect_err(keys);
+        let error = error.to_string();
+        assert!(
+            error.contains("scene:3:") && error.contains(expected),
+            "{keys}: {error}"
+        );
+    }
 }

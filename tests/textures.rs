@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use crate::common::folder;
+use glam::Vec3;
 use smithwalk::description::Description;
+use smithwalk::embree::Ray;
+use smithwalk::features::Features;
+use smithwalk::scene::{View, resolve};
 use smithwalk::texture::{
     Alpha, ColorSpace, Extension, Interpolation, Lookup, Texture, UvTransform,
 };
@@ -211,4 +215,121 @@ fn mistakes_are_told_at_their_place() {
             "{keys}: {error}"
         );
     }
+}
+
+/// A square, its texture coordinates and colours in other files.
+fn attributes(name: &str, second: &str) -> PathBuf {
+    let folder = folder(name);
+    greys("greys.png");
+    std::fs::copy(
+        crate::common::folder("textures").join("greys.png"),
+        folder.join("greys.png"),
+    )
+    .unwrap();
+    let corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n";
+    let write = |file: &str, text: String| std::fs::write(folder.join(file), text).unwrap();
+    write(
+        "quad.obj",
+        format!("{corners}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"),
+    );
+    write("second.obj", format!("{corners}{second}"));
+    write(
+        "paint.obj",
+        "v -1 -1 0 0.5 0 0\nv 1 -1 0 0 1 0\nv 1 1 0 0.5 0 1\nv -1 1 0 1 1 1\nf 1 2 3 4\n"
+            .to_owned(),
+    );
+    write(
+        "scene.yaml",
+        "smithwalk: 1\n\
+         textures:\n  first: {file: greys.png}\n  other: {file: greys.png, uv_map: second}\n  \
+           paint: {colors: paint, color_space: srgb}\n\
+         materials:\n  m: {diffuse: {color: {texture: other}}}\n  n: {diffuse: {color: {texture: paint}}}\n\
+         meshes: {quad: {file: quad.obj, uv_maps: {second: second.obj}, colors: {paint: paint.obj}}, bare: {file: quad.obj}}\n\
+         objects: [{mesh: quad, material: m}]\n"
+            .to_owned(),
+    );
+    folder.join("scene.yaml")
+}
+
+/// The colour where the line down at (x, y) meets a scene.
+fn color_at(path: &std::path::Path, overrides: &[(&str, &str)], x: f32, y: f32) -> [f32; 3] {
+    let scene = crate::common::load(path, overrides).scene;
+    let ray = Ray::new(Vec3::new(x, y, 5.0), -Vec3::Z);
+    let hit = scene
+        .accelerator
+        .intersect(ray)
+        .expect("the square is there");
+    let surface = scene.surface::<{ Features::EVERYTHING.bits() }>(&ray, &hit);
+    let view = View {
+        wo: Vec3::Z,
+        camera: true,
+    };
+    scene.albedo(&surface, view).to_array()
+}
+
+/// The second map is turned by a quarter and has a seam between the two triangles.
+#[test]
+fn textures_look_at_other_uv_maps() {
+    let second = "vt 0 0\nvt 0 1\nvt 1 1\nvt 1 0\nvt 0.375 0\nf 1/1 2/2 3/3\nf 1/5 3/5 4/5\n";
+    let path = attributes("uv-maps", second);
+    // Where u is 0.625: the third grey.
+    close(color_at(&path, &[], 0.75, 0.25)[0] * 255.0, 120.0);
+    close(color_at(&path, &[], 0.25, 0.75)[0] * 255.0, 60.0);
+    // Its own are as they were.
+    let own = [("materials.m.diffuse.color.texture", "first")];
+    close(color_at(&path, &own, -0.25, 0.9)[0] * 255.0, 60.0);
+}
+
+#[test]
+fn colors_of_vertices_are_textures() {
+    let path = attributes("vertex-colors", "vt 0 0\nf 1/1 2/1 3/1 4/1\n");
+    let paint = [("objects.0.material", "n")];
+    // Half way between the second and the third corner, decoded before.
+    let half = 0.5 * ((0.5f32 + 0.055) / 1.055).powf(2.4);
+    let [r, g, b] = color_at(&path, &paint, 0.999_999, 0.0);
+    close(r, half);
+    close(g, 0.5);
+    close(b, 0.5);
+}
+
+#[test]
+fn what_meshes_lack_is_told() {
+    let path = attributes("lacks", "vt 0 0\nf 1/1 2/1 3/1\n");
+    let refuse = |overrides: &[(&str, &str)]| {
+        let overrides: Vec<_> = overrides
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+            .collect();
+        let description = Description::load(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
+        resolve(&description).expect_err("refused").to_string()
+    };
+    let error = refuse(&[]);
+    assert!(
+        error.ends_with("second.obj: expected the faces of the mesh, 2 triangles, found 1"),
+        "{error}"
+    );
+    let error = refuse(&[("objects.0", "{mesh: bare, material: n}")]);
+    let expected = "scene.yaml:5:19: textures.paint.colors: this needs set of colours paint, \
+                    which the mesh `bare` of objects.0 lacks";
+    assert!(error.ends_with(expected), "{error}");
+    let error = refuse(&[
+        ("objects.0", "{mesh: quad, material: n}"),
+        ("meshes.quad.colors.paint", "quad.obj"),
+    ]);
+    assert!(
+        error.contains("quad.obj:1: expected 6 numbers after `v`, found 3"),
+        "{error}"
+    );
+    let unknown = Description::load(&path, &[("textures.other.uv_map".into(), "secnd".into())]);
+    let error = unknown.expect_err("no such map").to_string();
+    assert!(
+        error.contains("no mesh has the UV map `secnd`; did you mean `second`?"),
+        "{error}"
+    );
+    let both = Description::load(&path, &[("textures.paint.file".into(), "greys.png".into())]);
+    let error = both.expect_err("both").to_string();
+    assert!(
+        error.contains("`file` and `colors` exclude each other"),
+        "{error}"
+    );
 }

@@ -3,7 +3,7 @@
 A value that varies in a way the scene format has no word for is baked by
 Cycles. Where it depends on UVs alone it is baked over the square of UVs, and
 every object may share it; else over the unwrapped surface of its object,
-which then takes the unwrapping's UVs for everything.
+which then has the unwrapping's UVs beside its own.
 """
 
 import hashlib
@@ -24,7 +24,6 @@ class Needs:
     """What a material asks to be baked: {request: what its value depends on}."""
 
     requests: dict = field(default_factory=dict)
-    textures: dict = field(default_factory=dict)  # sockets that are image lookups the format can say
 
     @property
     def surface(self):
@@ -48,11 +47,11 @@ class Recorder:
     def __init__(self):
         self.needs = Needs()
 
-    def value(self, socket, groups, whole=False, texture=False):
+    def value(self, socket, groups, whole=False):
         """Records a request; None, as if nothing could be baked."""
         depends = dependencies_of(socket, groups, whole)
         if not depends & {"view"}:
-            (self.needs.textures if texture else self.needs.requests)[request(socket, groups, whole)] = depends
+            self.needs.requests[request(socket, groups, whole)] = depends
         return None
 
 
@@ -161,7 +160,7 @@ class Baker:
             copy.color, copy.pass_index = color, index
 
         def run():
-            asked = [list({**n.requests, **n.textures}) for n in needs]
+            asked = [list(n.requests) for n in needs]
             passes = []
             for i in range(max(map(len, asked))):
                 row = [(None, None)] * count

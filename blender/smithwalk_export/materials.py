@@ -7,14 +7,15 @@ surface that can't be carried at all becomes the magenta placeholder.
 """
 
 import math
+from dataclasses import replace
 
 import bpy
 
-from . import bake, nodes, relief
+from . import bake, relief
 from .audit import Audit
 from .bake import uniform
 from .log import Log
-from .meshes import unique_name
+from .meshes import BAKED, unique_name
 from .nodes import Graph, Texture, Unknown, dependencies, describe
 
 PLACEHOLDER = {"diffuse": {"color": [1.0, 0.0, 1.0]}}
@@ -73,6 +74,9 @@ class MaterialWriter:
         self.materials = {}     # name in the scene → material
         self.textures = {}      # name in the scene → texture
         self.radial_axes = {}   # name in the scene → axes its tangents turn about
+        self._looked_up = {}    # name in the scene → textures of UV maps or colours of vertices
+        self._current = None    # the material that is written
+        self.perturbed = set()  # names in the scene of those with normals or heights from textures
         self._names = {}        # (Blender's name_full or None, site key) → name in the scene
         self._textures = {}
         self._needs = {}
@@ -97,20 +101,43 @@ class MaterialWriter:
             self._names[key] = name
             self.radial_axes[name] = set()
             self.materials[name] = None  # reserves the name
+            self._current = self._looked_up[name] = []
             self.materials[name] = _Surface(self, material, name, _Baked(self, material, site)).translate()
         return self._names[key]
 
+    def attributes(self, names):
+        """The UV maps and colours of vertices that these materials look up."""
+        textures = [t for name in names for t in self._looked_up[name]]
+        return {t.uv_map for t in textures if t.uv_map}, {t.colors for t in textures if t.colors}
+
+    def looks_along(self, names):
+        """Whether one of these materials asks for the directions of UVs."""
+        return not self.perturbed.isdisjoint(names)
+
+    @staticmethod
+    def is_own(uv_map):
+        """Whether every mesh has this UV map, or the active one for None, as its own file's."""
+        active = (next((l.name for l in m.uv_layers if l.active_render), None) for m in bpy.data.meshes)
+        return uv_map is None or all(name in {None, uv_map} for name in active)
+
     def texture(self, texture, where):
         """The name in the scene of a texture, or None when its image has no pixels."""
-        key = (texture.image.name_full, texture.color_space, texture.interpolation, texture.extension,
-               texture.matrix, texture.alpha)
+        if self.images is None:  # a probe
+            return "probe"
+        if self.is_own(texture.uv_map):
+            texture = replace(texture, uv_map=None)
+        self._current.append(texture)
+        key = replace(texture, channel=None, image=texture.image and texture.image.name_full)
+        if key not in self._textures and texture.colors:
+            self._textures[key] = self._add_texture(
+                texture.colors, {"colors": texture.colors, "color_space": texture.color_space})
         if key not in self._textures:
-            if self.images is None:  # a probe
-                return "probe"
             file = self.images.add(texture.image, where)
             name = None
             if file:
                 entry = {"file": file, "color_space": texture.color_space}
+                if texture.uv_map:
+                    entry["uv_map"] = texture.uv_map
                 if texture.interpolation != "bilinear":
                     entry["interpolation"] = texture.interpolation
                 if texture.extension != "repeat":
@@ -147,6 +174,8 @@ class MaterialWriter:
             name = None
             if file:
                 entry = {"file": file, "color_space": "linear"}
+                if site.uv is not None:
+                    entry["uv_map"] = BAKED
                 u0, v0, u1, v1 = site.bounds
                 if site.bounds != (0.0, 0.0, 1.0, 1.0):
                     entry["scale"] = [1.0 / (u1 - u0), 1.0 / (v1 - v0)]
@@ -163,11 +192,10 @@ class _Baked:
         self.writer = writer
         self.material = material
         self.site = site
-        self.surface = site is not None and site.uv is not None
 
-    def value(self, socket, groups, whole=False, texture=False):
+    def value(self, socket, groups, whole=False):
         """A tuple of three floats, `{"texture": NAME}`, or None where nothing was baked."""
-        if self.site is None or (texture and not self.surface):
+        if self.site is None:
             return None
         request = bake.request(socket, groups, whole)
         image = self.site.results.get((self.material.name_full, request))
@@ -285,8 +313,8 @@ class _Surface:
         or Unknown; what can be baked was."""
         socket = node.inputs[name]
         value = self.graph.evaluate(socket, groups)
-        if isinstance(value, (Unknown, Texture)):
-            baked = self.baked.value(socket, groups, texture=isinstance(value, Texture))
+        if isinstance(value, Unknown):
+            baked = self.baked.value(socket, groups)
             if isinstance(baked, tuple):
                 return sum(baked) / 3.0 if socket.type == "VALUE" else baked
             if baked is not None:
@@ -363,8 +391,10 @@ class _Surface:
         source = self.graph.follow(node.inputs["Tangent"], groups)
         if source.linked and source.node.type == "TANGENT":
             view = self.graph.view(source.node)
-            view.accept("uv_map", "axis")
+            view.accept("axis")
             if view.direction_type == "UV_MAP":
+                if not self.writer.is_own(view.uv_map or None):
+                    self.warn(f'tangent along UV map "{view.uv_map}": each mesh\'s active one is taken', node)
                 return {}  # uv is the default
             axis = source.node.axis.lower()
         else:
@@ -585,10 +615,3 @@ _CLOSURES = {
     "MIX_SHADER": _Surface.mix,
     "ADD_SHADER": _Surface.add,
 }
-
-
-def asks_for_uv_maps(material):
-    """The UV maps a material names."""
-    if material is None or not material.use_nodes or material.node_tree is None:
-        return set()
-    return nodes.uv_map_names(material.node_tree)

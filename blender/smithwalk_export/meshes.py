@@ -14,6 +14,7 @@ import re
 
 import numpy as np
 
+BAKED = "baked"     # the UV map that baked images are on
 FARTHEST = 1e18    # metres: squares of larger coordinates leave single precision
 LEAN = 25.0        # degrees between a corner's normal and its face's, from which Cycles looks otherwise
 _LINES = 100_000  # formatted at a time: bounds the memory of the text
@@ -34,22 +35,25 @@ class MeshWriter:
     def __init__(self, files, log):
         self.files = files     # where files go (files.Folder)
         self.log = log
-        self.meshes = {}       # mesh name → file name
+        self.meshes = {}       # mesh name → its entry in the scene
         self._names = {}       # identity of the arrays, from `_same` → mesh name
         self._first = {}       # quick signature → [identity, arrays until a second mesh has the same one]
-        self._by_key = {}      # evaluated data, UVs, transform → (mesh name, used slots) or None
+        self._by_key = {}      # evaluated data, what is asked of it, transform → (mesh name, used slots) or None
 
-    def add(self, ob, uv=None, transform=None, progress=None):
+    def add(self, ob, uv_maps=(), colors=(), baked=None, needs_uv=False, transform=None, progress=None):
         """The mesh name and the used material slots of an evaluated object.
 
         None when the object has no faces. Objects that share evaluated data
-        (instances, linked duplicates) share the file. `uv` takes the place of
-        the active UV map (one row per loop); `transform` moves the vertices.
+        (instances, linked duplicates) share the file. `uv_maps` and `colors`
+        are names of what is written beside the active UV map; `baked` are the
+        UVs of bakes (one row per loop); with `needs_uv` a mesh without UVs has
+        them at 0, as in Cycles; `transform` moves the vertices.
         """
-        key = (ob.data.as_pointer(), id(uv) if uv is not None else None,
+        key = (ob.data.as_pointer(), tuple(sorted(uv_maps)), tuple(sorted(colors)),
+               id(baked) if baked is not None else None, needs_uv,
                tuple(map(tuple, transform)) if transform is not None else None)
         if key not in self._by_key:
-            self._by_key[key] = self._write(ob, uv, transform, progress)
+            self._by_key[key] = self._write(ob, key[1], key[2], baked, needs_uv, transform, progress)
         return self._by_key[key]
 
     def _same(self, arrays):
@@ -63,14 +67,14 @@ class MeshWriter:
         digest = arrays.digest()
         return signature if digest == entry[1] else digest
 
-    def _write(self, ob, uv, transform, progress):
+    def _write(self, ob, uv_maps, colors, baked, needs_uv, transform, progress):
         mesh = ob.to_mesh()
         if mesh is None:
             return None
         try:
             if not mesh.polygons:
                 return None
-            arrays = Arrays(mesh, uv, transform)
+            arrays = Arrays(mesh, transform, _sides(mesh, uv_maps, colors, baked), needs_uv)
         finally:
             ob.to_mesh_clear()
         if arrays.left_out:
@@ -88,9 +92,16 @@ class MeshWriter:
             # Evaluated data has names of its own in some versions.
             name = self._names[same] = unique_name(ob.original.data.name, self.meshes)
             path, file = self.files.new(f"{name}.obj")
-            self.meshes[name] = file
             with open(path, "w", encoding="ascii") as f:
                 arrays.write(f, progress)
+            entry = self.meshes[name] = {"file": file}
+            for kind, side, values in arrays.sides:
+                beside = file
+                if values is not None:
+                    path, beside = self.files.new(f"{name}_{unique_name(side, ())}.obj")
+                    with open(path, "w", encoding="ascii") as f:
+                        arrays.write_side(f, kind, values)
+                entry.setdefault(kind, {})[side] = beside
         return name, arrays.slots
 
 
@@ -104,6 +115,38 @@ def _integers(collection, attribute, count):
     values = np.empty(count, dtype=np.int32)
     collection.foreach_get(attribute, values)
     return values
+
+
+def _sides(mesh, uv_maps, colors, baked):
+    """What is written beside a mesh: (key of the format, name, values per corner). The
+    values are None where the mesh's own file has them; what is missing is 0, as in Cycles."""
+    count = len(mesh.loops)
+    sides = []
+    for name in uv_maps:
+        layer = mesh.uv_layers.get(name)
+        if layer is not None and layer.active_render:
+            values = None
+        elif layer is not None and len(layer.data):
+            values = _finite(_floats(layer.data, "uv", 2, count))
+        else:
+            values = np.zeros((count, 2), dtype=np.float32)
+        sides.append(("uv_maps", name, values))
+    if baked is not None:
+        sides.append(("uv_maps", BAKED, _finite(baked)))
+    for name in colors:
+        layer = mesh.color_attributes.get(name)
+        if layer is None or not len(layer.data):
+            values = np.zeros((count, 3), dtype=np.float32)
+        else:
+            values = _floats(layer.data, "color", 4, len(layer.data))[:, :3]
+            if layer.domain == "POINT":
+                values = values[_integers(mesh.loops, "vertex_index", count)]
+        sides.append(("colors", name, _finite(values)))
+    return sides
+
+
+def _finite(values):
+    return np.where(np.isfinite(values), values, 0.0).astype(np.float32)
 
 
 def _corner_normals(mesh):
@@ -186,12 +229,14 @@ def _polygons(mesh, loop_count):
 class Arrays:
     """A mesh as an OBJ holds it: vertices, normals, UVs, faces by slot."""
 
-    def __init__(self, mesh, uv=None, transform=None):
+    def __init__(self, mesh, transform=None, sides=(), needs_uv=False):
         count = len(mesh.vertices)
+        self.sides = sides
         self.positions = _floats(mesh.vertices, "co", 3, count)
-        if uv is None:
-            layer = next((l for l in mesh.uv_layers if l.active_render), None)
-            uv = _floats(layer.data, "uv", 2, len(mesh.loops)) if layer and len(layer.data) else None
+        layer = next((l for l in mesh.uv_layers if l.active_render), None)
+        uv = _floats(layer.data, "uv", 2, len(mesh.loops)) if layer and len(layer.data) else None
+        if uv is None and needs_uv:
+            uv = np.zeros((len(mesh.loops), 2), dtype=np.float32)
         if transform is not None:
             matrix = np.array(transform, dtype=np.float64)
             self.positions = (self.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
@@ -226,7 +271,7 @@ class Arrays:
             del normals, keys
         self.uvs = uv_index = None
         if uv is not None and len(uv):
-            uv = np.where(np.isfinite(uv), uv, 0.0).astype(np.float32)
+            uv = _finite(uv)
             # Two float32 side by side are one 64-bit key; + 0 makes −0 the same as 0.
             keys = np.ascontiguousarray(uv + 0.0).view(np.int64).reshape(-1)
             self.uvs, uv_index = _indexed(keys, uv, vertex_of, count)
@@ -234,6 +279,8 @@ class Arrays:
         indices = [i for i in (vertex_of, uv_index, normal_index) if i is not None]
         self.slots = sorted(set().union(*(np.unique(s).tolist() for _, s in polygons)))
         self.faces = {slot: [] for slot in self.slots}
+        self._loops = {slot: [] for slot in self.slots if sides}
+        self._vertex_of = vertex_of
         for loops, slots in polygons:
             for slot in self.slots:
                 chosen = loops[slots == slot] if len(self.slots) > 1 else loops
@@ -241,6 +288,8 @@ class Arrays:
                     table = np.stack([i[chosen] for i in indices], axis=2).astype(np.int32, copy=False)
                     table += 1
                     self.faces[slot].append(table.reshape(len(chosen), -1))
+                    if sides:
+                        self._loops[slot].append(chosen)
         self._corner = {(True, True): " %d/%d/%d", (True, False): " %d/%d", (False, True): " %d//%d",
                         (False, False): " %d"}[self.uvs is not None, self.normals is not None]
         self._width = len(indices)
@@ -248,12 +297,13 @@ class Arrays:
     def signature(self):
         """What is the same for equal meshes and quick to find."""
         return (len(self.positions), tuple(self.slots), tuple(len(t) for f in self.faces.values() for t in f),
-                self.positions[:4].tobytes())
+                self.positions[:4].tobytes(), tuple(side[:2] for side in self.sides))
 
     def digest(self):
         """A hash of all that the file would hold."""
         sha = hashlib.sha256((self._corner + str(self.slots)).encode())
-        for array in (self.positions, self.normals, self.uvs, *(t for f in self.faces.values() for t in f)):
+        for array in (self.positions, self.normals, self.uvs, *(t for f in self.faces.values() for t in f),
+                      *(values for _, _, values in self.sides)):
             sha.update(b"" if array is None else np.ascontiguousarray(array))
         return sha.digest()
 
@@ -279,6 +329,35 @@ class Arrays:
                 out.write(f"usemtl slot_{slot}\n")
             for table in self.faces[slot]:
                 lines(table, "f" + self._corner * (table.shape[1] // self._width) + "\n")
+
+
+    def write_side(self, out, kind, values):
+        """The OBJ of the same faces with other UVs, or with colours of vertices."""
+        rows = np.ascontiguousarray(values + np.float32(0.0))
+        if kind == "colors":  # a vertex for each colour that one has
+            keys = np.empty((len(rows), 4), dtype=np.uint32)
+            keys[:, 0] = self._vertex_of
+            keys[:, 1:] = rows.view(np.uint32)
+            _, where, index = np.unique(keys.view(np.dtype((np.void, 16))).reshape(-1),
+                                        return_index=True, return_inverse=True)
+            vertices = np.hstack([self.positions[self._vertex_of[where]], rows[where]])
+            indices, lines = [index.reshape(-1)], [(vertices, "v" + " %.9g" * 6 + "\n")]
+        else:
+            keys = rows.view(np.int64).reshape(-1)
+            rows, index = _indexed(keys, rows, self._vertex_of, len(self.positions))
+            indices = [self._vertex_of, index]
+            lines = [(self.positions, "v %.9g %.9g %.9g\n"), (rows, "vt %.9g %.9g\n")]
+        for table, line in lines:
+            for _ in _format(out, table, line):
+                pass
+        corner = " " + "/".join(["%d"] * len(indices))
+        for slot in self.slots:
+            if len(self.slots) > 1:
+                out.write(f"usemtl slot_{slot}\n")
+            for loops in self._loops[slot]:
+                table = np.stack([i[loops] for i in indices], axis=2) + 1
+                for _ in _format(out, table.reshape(len(loops), -1), "f" + corner * loops.shape[1] + "\n"):
+                    pass
 
 
 def _format(out, rows, line):

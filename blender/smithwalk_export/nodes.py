@@ -18,9 +18,12 @@ LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Linear BT.709"
 
 @dataclass(frozen=True)
 class Texture:
-    """An image lookup. `channel` is None for the colour, else r, g, b, a or luminance."""
+    """An image lookup, or colours of vertices. `channel` is None for the colour, else r, g, b, a
+    or luminance."""
 
-    image: bpy.types.Image
+    image: bpy.types.Image = None
+    colors: str = None  # the name of a colour attribute, without an image
+    uv_map: str = None  # the name of a UV map, where a node gives one
     color_space: str = "srgb"
     interpolation: str = "bilinear"
     extension: str = "repeat"
@@ -161,6 +164,9 @@ class Graph:
         if node.type in {"SEPRGB", "SEPARATE_COLOR", "SEPXYZ"}:
             value = self._separate(source, view)
             return unknown() if value is None else value
+        if node.type in {"VERTEX_COLOR", "ATTRIBUTE"} and source.socket.name == "Color":
+            name = _colors(view)
+            return Texture(colors=name, color_space="linear") if name else unknown()
         if node.type == "RGBTOBW":
             value = self.read(source, 0)
             if isinstance(value, Texture):
@@ -248,9 +254,9 @@ class Graph:
         node = vector.node
         view = self.view(node)
         if node.type == "UVMAP" or (node.type == "TEX_COORD" and vector.socket.name == "UV"):
-            view.accept("uv_map")  # that it is the mesh's active one is checked per object
+            name = view.get("uv_map") or None
             if not view.get("from_instancer"):
-                return _placed(texture, placed)
+                return _placed(replace(texture, uv_map=name), placed)
         elif node.type == "MAPPING" and view.vector_type != "NORMAL":
             location, rotation, scale = (
                 self.evaluate(node.inputs[name], vector.groups) if node.inputs[name].enabled else (0.0, 0.0, 0.0)
@@ -262,6 +268,18 @@ class Graph:
                 return self._place(texture, below, placed @ step)
         self.forget(node)
         return Unknown(f"{describe(node)} as coordinates of an image")
+
+
+def _colors(view):
+    """The name of the colour attribute that a node reads, or None."""
+    if view.get("layer_name"):
+        return view.layer_name
+    name = view.get("attribute_name")
+    if not name or view.attribute_type != "GEOMETRY":
+        return None
+    # An attribute node may name anything: the meshes know whether that is colours.
+    colors = any(name in mesh.color_attributes for mesh in bpy.data.meshes)
+    return name if colors and not any(name in mesh.uv_layers for mesh in bpy.data.meshes) else None
 
 
 def _mapping(kind, location, rotation, scale):
@@ -289,7 +307,8 @@ def _convert(value, from_type, to_type):
         if to_type == "VALUE" and value.channel is None:
             return replace(value, channel="luminance")
         if to_type in {"RGBA", "VECTOR"} and value.channel is not None:
-            return Unknown(f'one channel of image "{value.image.name}" used as a colour')
+            what = f'image "{value.image.name}"' if value.image else f'colours "{value.colors}"'
+            return Unknown(f"one channel of {what} used as a colour")
         return value
     if to_type == "VALUE" and isinstance(value, tuple):
         return luminance(value) if from_type == "RGBA" else sum(value) / 3.0

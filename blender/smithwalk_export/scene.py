@@ -18,7 +18,7 @@ from .bake import Baker
 from .files import Folder
 from .images import ImageWriter
 from .log import Log
-from .materials import MaterialWriter, asks_for_uv_maps
+from .materials import MaterialWriter
 from .meshes import MeshWriter
 from .world import WorldWriter
 
@@ -153,14 +153,14 @@ class Job:
         if self.bake == NO_BAKE:
             return
         self.world.prepare()
-        if any(self._needs(m).requests or asks_for_uv_maps(m) for m in bpy.data.materials if m.users):
+        if any(self._needs(m).requests for m in bpy.data.materials if m.users):
             _with_depsgraph(self.scene, self.layer, self.plan)
             self.baker.run()
 
     def prepare_from(self, depsgraph):
         """Within a render: what earlier bakes left in the cache."""
         self.world.prepare()
-        if any(self._needs(m).requests or asks_for_uv_maps(m) for m in bpy.data.materials if m.users):
+        if any(self._needs(m).requests for m in bpy.data.materials if m.users):
             self.plan(depsgraph)
             self.baker.run()
 
@@ -170,22 +170,9 @@ class Job:
     def plan(self, depsgraph):
         """Register the bakes of all objects."""
         for ob, matrix, slots, materials in self._surfaces(depsgraph):
-            needs = self._object_needs(ob, materials)
+            needs = [self._needs(m) for m in materials]
             if any(n.requests or n.surface for n in needs):
                 self.baker.plan(ob, matrix, materials, needs, depsgraph)
-
-    def _object_needs(self, ob, materials):
-        """Needs by slot; maps other than the active one are brought to it by a bake."""
-        needs = [self._needs(m) for m in materials]
-        active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
-        asked = set().union(*(asks_for_uv_maps(m) for m in materials)) if materials else set()
-        if (asked & set(l.name for l in ob.data.uv_layers)) - {active} and not any(n.surface for n in needs):
-            forced = [type(n)(dict(n.requests), dict(n.textures)) for n in needs]
-            for n in forced:
-                if n.textures:
-                    n.requests.update({r: d | {"surface"} for r, d in n.textures.items()})
-            return forced
-        return needs
 
     def _surfaces(self, depsgraph):
         """Each evaluated mesh object once: (object, matrix, used slots, materials by used slot)."""
@@ -268,7 +255,7 @@ class Job:
             "world": world,
             "textures": self.materials.textures,
             "materials": self.materials.materials,
-            "meshes": {name: {"file": file} for name, file in meshes.meshes.items()},
+            "meshes": meshes.meshes,
             "objects": objects,
             "lights": lamps,
         }
@@ -348,19 +335,21 @@ class Job:
             self.log.warn(where, "its scale flattens it: its faces are shaded flat, not smooth")
         slots = _used_slots(ob.data)
         materials = [self._slot_material(ob, i, depsgraph) for i in slots]
-        needs = self._object_needs(ob, materials)
+        needs = [self._needs(m) for m in materials]
         sites, uv = [None] * len(slots), None
         if any(n.requests for n in needs):
             key = (ob.name_full, ob.data.as_pointer())
             if key not in self._sites:
                 self._sites[key] = self.baker.site(ob, matrix, materials, needs)
             sites, uv = self._sites[key]
-        written = meshes.add(ob, uv, transform, lambda share: self.progress(f"exporting {ob.name}", share))
+        by_slot = {i: self.materials.add(m, s) for i, m, s in zip(slots, materials, sites)}
+        uv_maps, colors = self.materials.attributes(by_slot.values())
+        written = meshes.add(ob, uv_maps, colors, uv, self.materials.looks_along(by_slot.values()), transform,
+                             lambda share: self.progress(f"exporting {ob.name}", share))
         if written is None:
             return None
         mesh, used = written
-        chosen = [(materials[slots.index(i)], sites[slots.index(i)]) for i in used]
-        names = [self.materials.add(m, s) for m, s in chosen]
+        names = [by_slot[i] for i in used]
         entry = {"name": ob.name, "mesh": mesh}
         if len(names) == 1:
             entry["material"] = names[0]
@@ -376,18 +365,8 @@ class Job:
             entry["hidden_from"] = hidden
         if ob.is_holdout or original.holdout_get(view_layer=depsgraph.view_layer):
             entry["holdout"] = True
-        if uv is None:
-            self._check_coordinates(ob, materials, where)
         self._check_tangents(ob, names, where)
         return entry
-
-    def _check_coordinates(self, ob, materials, where):
-        """Name UV maps that are asked for and are not the one that is written."""
-        active = next((l.name for l in ob.data.uv_layers if l.active_render), None)
-        here = {l.name for l in ob.data.uv_layers}
-        for name in sorted(set().union(*(asks_for_uv_maps(m) for m in materials)) - {active}):
-            if name in here:
-                self.log.warn(where, f'UV map "{name}" is asked for, but only the active one is written')
 
     def _check_tangents(self, ob, names, where):
         """Blender's radial tangents turn in coordinates that the bounding box scales, the

@@ -1,7 +1,7 @@
 //! Surfaces made of layers.
 
 use super::material::{Factor, Material, MaterialRef};
-use super::relief::NormalMap;
+use super::relief::{Bump, NormalMap, Relief};
 use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
@@ -24,6 +24,8 @@ pub struct Layered {
     pub tangent: Tangent,
     /// What replaces the interpolated normal of all layers.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 fn none() -> Scalar {
@@ -83,6 +85,9 @@ impl TryFrom<RawInterface> for Interface {
         if raw.normal.is_some() {
             return Err(Clash::new("normal", OWN_NORMAL));
         }
+        if raw.bump.is_some() {
+            return Err(Clash::new("bump", OWN_NORMAL));
+        }
         let rough = raw.rough()?;
         let slab = match (raw.absorption, raw.thickness, raw.transmittance) {
             (None, None, None) => Slab::Clear,
@@ -137,7 +142,7 @@ impl Layered {
             }
         }
         check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
-        check.normal(self.normal.as_ref(), at);
+        check.relief(Relief::of(&self.normal, &self.bump), at);
         if let Some(base) = &self.base {
             base.check(check, at.key("base"));
             check_base(base, false, check, at.key("base"));
@@ -185,7 +190,7 @@ fn check_base(base: &MaterialRef, in_mix: bool, check: &mut Check<'_, '_>, at: A
 /// Whether a material, mixed with another or alone, can be the base of a stack; of a
 /// mix its factor alone is looked at.
 pub(crate) fn fits(material: &Material, in_mix: bool) -> Result<(), String> {
-    if material.normal().is_some() {
+    if !material.relief().is_flat() {
         return Err(OWN_NORMAL.to_owned());
     }
     let rough = match material {

@@ -4,7 +4,7 @@ use super::filled::Filled;
 use super::layered::Layered;
 use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
-use super::relief::NormalMap;
+use super::relief::{Bump, NormalMap, Relief};
 use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar, visit_numbers};
@@ -144,6 +144,8 @@ pub struct Diffuse {
     pub version: Version,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 impl Default for Diffuse {
@@ -153,6 +155,7 @@ impl Default for Diffuse {
             roughness: Scalar::Value(0.0),
             version: Version::V4_5,
             normal: None,
+            bump: None,
         }
     }
 }
@@ -181,6 +184,8 @@ pub struct Translucent {
     pub color: Color,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 impl Default for Translucent {
@@ -188,6 +193,7 @@ impl Default for Translucent {
         Self {
             color: Color::WHITE,
             normal: None,
+            bump: None,
         }
     }
 }
@@ -202,6 +208,8 @@ pub struct Velvet {
     pub sigma: Scalar,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 impl Default for Velvet {
@@ -210,6 +218,7 @@ impl Default for Velvet {
             color: Color::WHITE,
             sigma: Scalar::Value(1.0),
             normal: None,
+            bump: None,
         }
     }
 }
@@ -224,6 +233,8 @@ pub struct Sheen {
     pub roughness: Scalar,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 impl Default for Sheen {
@@ -232,6 +243,7 @@ impl Default for Sheen {
             color: Color::WHITE,
             roughness: Scalar::Value(0.5),
             normal: None,
+            bump: None,
         }
     }
 }
@@ -526,12 +538,12 @@ impl Material {
                 let at = at.key("diffuse");
                 check.color(&diffuse.color, Range::UNIT, at.key("color"));
                 check.scalar(&diffuse.roughness, Range::UNIT, at.key("roughness"));
-                check.normal(diffuse.normal.as_ref(), &at);
+                check.relief(Relief::of(&diffuse.normal, &diffuse.bump), &at);
             }
             Self::Translucent(part) => {
                 let at = at.key("translucent");
                 check.color(&part.color, Range::UNIT, at.key("color"));
-                check.normal(part.normal.as_ref(), &at);
+                check.relief(Relief::of(&part.normal, &part.bump), &at);
             }
             Self::Transparent(part) => {
                 check.color(&part.color, Range::UNIT, at.key("transparent").key("color"));
@@ -540,13 +552,13 @@ impl Material {
                 let at = at.key("velvet");
                 check.color(&velvet.color, Range::UNIT, at.key("color"));
                 check.scalar(&velvet.sigma, Range::NonNegative, at.key("sigma"));
-                check.normal(velvet.normal.as_ref(), &at);
+                check.relief(Relief::of(&velvet.normal, &velvet.bump), &at);
             }
             Self::Sheen(sheen) => {
                 let at = at.key("sheen");
                 check.color(&sheen.color, Range::UNIT, at.key("color"));
                 check.scalar(&sheen.roughness, Range::UNIT, at.key("roughness"));
-                check.normal(sheen.normal.as_ref(), &at);
+                check.relief(Relief::of(&sheen.normal, &sheen.bump), &at);
             }
             Self::Emission(emission) => {
                 let at = at.key("emission");
@@ -581,22 +593,24 @@ impl Material {
         }
     }
 
-    /// What replaces its interpolated normal.
+    /// What replaces and leans its interpolated normal.
     #[must_use]
-    pub fn normal(&self) -> Option<&NormalMap> {
+    pub fn relief(&self) -> Relief<'_> {
         match self {
             Self::Conductor(Conductor { rough, .. })
             | Self::Dielectric(Dielectric { rough, .. })
             | Self::Refraction(Dielectric { rough, .. })
-            | Self::RoughDiffuse(RoughDiffuse { rough, .. }) => rough.normal.as_ref(),
-            Self::Diffuse(part) => part.normal.as_ref(),
-            Self::Translucent(part) => part.normal.as_ref(),
-            Self::Velvet(part) => part.normal.as_ref(),
-            Self::Sheen(part) => part.normal.as_ref(),
-            Self::Layered(part) => part.normal.as_ref(),
-            Self::Principled(part) => part.normal.as_ref(),
-            Self::OpenPbr(part) => part.normal.as_ref(),
-            _ => None,
+            | Self::RoughDiffuse(RoughDiffuse { rough, .. }) => {
+                Relief::of(&rough.normal, &rough.bump)
+            }
+            Self::Diffuse(part) => Relief::of(&part.normal, &part.bump),
+            Self::Translucent(part) => Relief::of(&part.normal, &part.bump),
+            Self::Velvet(part) => Relief::of(&part.normal, &part.bump),
+            Self::Sheen(part) => Relief::of(&part.normal, &part.bump),
+            Self::Layered(part) => Relief::of(&part.normal, &part.bump),
+            Self::Principled(part) => Relief::of(&part.normal, &part.bump),
+            Self::OpenPbr(part) => Relief::of(&part.normal, &part.bump),
+            _ => Relief::default(),
         }
     }
 
@@ -688,6 +702,6 @@ impl Rough {
             }
         }
         check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
-        check.normal(self.normal.as_ref(), at);
+        check.relief(Relief::of(&self.normal, &self.bump), at);
     }
 }

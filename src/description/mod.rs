@@ -41,10 +41,10 @@ pub use material::{
 pub use openpbr::OpenPbr;
 pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Version};
 pub use problem::{Problem, Problems};
-pub use relief::{NormalMap, NormalSpace};
+pub use relief::{Bump, NormalFilter, NormalMap, NormalSpace, Relief};
 pub use rough::{Axis, Distribution, Rough, Roughness, Scattering, Tangent};
 pub use settings::{Estimator, Film, Filter, LightUnits, Sampling, ViewTransform, World};
-pub use texture::{Placing, Texture};
+pub use texture::{ImageTexture, Placing, Texture};
 pub use transform::Transform;
 pub use value::{Color, Scalar};
 
@@ -121,10 +121,11 @@ pub struct Description {
     /// The directory that the file's relative paths start from.
     #[serde(skip)]
     pub directory: PathBuf,
-    /// For each material that looks along the surface, as normal maps do, the first
-    /// place that says so: what is wrong with meshes shows when they are read.
+    /// Where what is looked up on meshes is first asked for, since what they lack shows
+    /// when they are read: by `material NAME`, for those that look along the surface as
+    /// normal maps do, `UV map NAME` and `set of colours NAME`.
     #[serde(skip)]
-    pub perturbed: BTreeMap<String, String>,
+    pub places: BTreeMap<String, String>,
 }
 
 impl Description {
@@ -165,7 +166,7 @@ impl Description {
     fn from_tree(tree: &mut Node, mut sources: Sources<'_>) -> Result<Self, Problems> {
         let mut description = read::read::<Self>(tree, &mut sources);
         if let Some(description) = &mut description {
-            description.perturbed = validate::description(description, tree, &mut sources);
+            description.places = validate::description(description, tree, &mut sources);
         }
         match description {
             Some(description) if sources.count() == 0 => Ok(description),
@@ -259,6 +260,12 @@ impl Material {
 pub struct Mesh {
     /// The Wavefront OBJ file, relative to the scene file.
     pub file: PathBuf,
+    /// OBJ files of the same faces, whose texture coordinates are UV maps by name.
+    #[serde(default)]
+    pub uv_maps: BTreeMap<String, PathBuf>,
+    /// OBJ files of the same faces, or this one, whose vertices have colours.
+    #[serde(default)]
+    pub colors: BTreeMap<String, PathBuf>,
 }
 
 /// One instance of a mesh.

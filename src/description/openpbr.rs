@@ -1,6 +1,6 @@
 //! OpenPBR 1.1.1, by the names of its parameters.
 
-use super::relief::NormalMap;
+use super::relief::{Bump, NormalMap, Relief};
 use super::rough::Tangent;
 use super::validate::{At, Check, Range};
 use super::value::{Color, Scalar};
@@ -18,6 +18,8 @@ macro_rules! parameters {
             pub tangent: Tangent,
             /// What replaces the interpolated normal.
             pub normal: Option<NormalMap>,
+            /// What leans it.
+            pub bump: Option<Bump>,
             $($(#[$doc])* pub $key: $type,)*
         }
 
@@ -26,6 +28,7 @@ macro_rules! parameters {
                 Self {
                     tangent: Tangent::default(),
                     normal: None,
+                    bump: None,
                     $($key: <$type>::from($default),)*
                 }
             }
@@ -33,7 +36,7 @@ macro_rules! parameters {
 
         impl OpenPbr {
             pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
-                check.normal(self.normal.as_ref(), at);
+                check.relief(Relief::of(&self.normal, &self.bump), at);
                 $(parameters!(@$type check, &self.$key, $range, at.key(stringify!($key)));)*
             }
         }

@@ -1,6 +1,6 @@
 //! Blender's Principled BSDF, by the sockets of its node.
 
-use super::relief::NormalMap;
+use super::relief::{Bump, NormalMap, Relief};
 use super::rough::Tangent;
 use super::validate::{At, Check, Range};
 use super::value::{Clash, Color, Scalar};
@@ -64,6 +64,8 @@ pub struct Principled {
     pub tangent: Tangent,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
     /// The values.
     pub sockets: Sockets,
 }
@@ -154,6 +156,7 @@ macro_rules! raw {
             #[serde(default)]
             tangent: Tangent,
             normal: Option<NormalMap>,
+            bump: Option<Bump>,
             $($key: Option<Socket>,)*
         }
 
@@ -337,6 +340,7 @@ impl TryFrom<Raw> for Principled {
             multiple: raw.distribution.unwrap_or(usual) == Facets::MultiGgx,
             tangent: raw.tangent,
             normal: raw.normal,
+            bump: raw.bump,
             sockets,
         })
     }
@@ -344,7 +348,7 @@ impl TryFrom<Raw> for Principled {
 
 impl Principled {
     pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
-        check.normal(self.normal.as_ref(), at);
+        check.relief(Relief::of(&self.normal, &self.bump), at);
         match &self.sockets {
             Sockets::V3(sockets) => sockets.check(check, at),
             Sockets::V4(sockets) => sockets.check(check, at),

@@ -1,6 +1,6 @@
 //! The keys that all rough materials share.
 
-use super::relief::NormalMap;
+use super::relief::{Bump, NormalMap};
 use super::value::{Clash, Scalar};
 pub use crate::bsdf::Distribution;
 use serde::Deserialize;
@@ -21,6 +21,8 @@ pub struct Rough {
     pub tangent: Tangent,
     /// What replaces the interpolated normal.
     pub normal: Option<NormalMap>,
+    /// What leans it.
+    pub bump: Option<Bump>,
 }
 
 /// How rough, in the way the file says it.
@@ -97,6 +99,7 @@ macro_rules! raw_rough {
                 #[serde(default)]
                 tangent: Tangent,
                 normal: Option<NormalMap>,
+                bump: Option<Bump>,
                 $($key: $type,)*
             }
 
@@ -111,6 +114,7 @@ macro_rules! raw_rough {
                         rotation: self.rotation.take().unwrap_or(Scalar::Value(0.0)),
                         tangent: self.tangent,
                         normal: self.normal.take(),
+                        bump: self.bump.take(),
                     })
                 }
             }

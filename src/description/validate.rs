@@ -5,7 +5,7 @@ use super::mixes;
 use super::problem::{Place, Sources, nearest};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
-    Material, NormalMap, Object, Opening, Projection, Sampling, Scalar, Transform, ViewTransform,
+    Material, Object, Opening, Projection, Relief, Sampling, Scalar, Transform, ViewTransform,
     World,
 };
 use crate::film::Aov;
@@ -23,7 +23,7 @@ const CAMERA: (RayKind, &str) = (
 );
 
 /// Checks a description against the tree it came from; gives
-/// [`Description::perturbed`].
+/// [`Description::places`].
 pub(super) fn description(
     description: &Description,
     tree: &Node,
@@ -33,7 +33,7 @@ pub(super) fn description(
         tree,
         sources,
         in_scene: true,
-        perturbed: BTreeMap::new(),
+        places: BTreeMap::new(),
     };
     let root = At::root();
     if description.version != 1 {
@@ -51,7 +51,11 @@ pub(super) fn description(
         check.world(world, root.key("world"));
     }
     for (name, texture) in &description.textures {
-        texture.check(&mut check, root.key("textures").key(name));
+        texture.check(
+            &description.meshes,
+            &mut check,
+            root.key("textures").key(name),
+        );
     }
     for (name, material) in &description.materials {
         material.check(&mut check, root.key("materials").key(name));
@@ -63,7 +67,7 @@ pub(super) fn description(
     for (index, light) in description.lights.iter().enumerate() {
         check.light(light, root.key("lights").index(index));
     }
-    check.perturbed
+    check.places
 }
 
 /// Checks a material that stands alone.
@@ -72,7 +76,7 @@ pub(super) fn material(material: &Material, tree: &Node, sources: &mut Sources) 
         tree,
         sources,
         in_scene: false,
-        perturbed: BTreeMap::new(),
+        places: BTreeMap::new(),
     };
     material.check(&mut check, At::root());
 }
@@ -145,7 +149,7 @@ pub(super) struct Check<'a, 's> {
     sources: &'a mut Sources<'s>,
     /// Whether there are materials and textures to name.
     in_scene: bool,
-    perturbed: BTreeMap<String, String>,
+    places: BTreeMap<String, String>,
 }
 
 impl Check<'_, '_> {
@@ -160,18 +164,42 @@ impl Check<'_, '_> {
         self.sources.report(place, dotted(&path), message, nearest);
     }
 
-    /// Keeps where a material looks along the surface.
-    pub(super) fn needs_uvs(&mut self, At(steps): &At) {
-        if let [Step::Key(_), Step::Key(material), ..] = &steps[..] {
-            let (node, path) = self.tree.descend(steps);
-            let place = self.sources.describe(node.place, &dotted(&path));
-            self.perturbed.entry(material.clone()).or_insert(place);
+    /// Keeps where a material looks along the surface, see [`Description::places`].
+    pub(super) fn needs_uvs(&mut self, at: &At) {
+        if let [Step::Key(_), Step::Key(material), ..] = &at.0[..] {
+            self.keep_place(format!("material {material}"), at);
         }
     }
 
-    pub(super) fn normal(&mut self, normal: Option<&NormalMap>, at: &At) {
-        if let Some(normal) = normal {
+    /// A name that meshes give to what their vertices have.
+    pub(super) fn attribute<'n>(
+        &mut self,
+        what: &str,
+        name: &str,
+        known: impl Iterator<Item = &'n String> + Clone,
+        at: At,
+    ) {
+        if known.clone().any(|known| known == name) {
+            self.keep_place(format!("{what} {name}"), &at);
+            return;
+        }
+        let nearest = nearest(name, known.map(String::as_str));
+        let message = format!("no mesh has the {what} `{}`", excerpt(name));
+        self.report_near(at, message, nearest);
+    }
+
+    fn keep_place(&mut self, of: String, At(steps): &At) {
+        let (node, path) = self.tree.descend(steps);
+        let place = self.sources.describe(node.place, &dotted(&path));
+        self.places.entry(of).or_insert(place);
+    }
+
+    pub(super) fn relief(&mut self, relief: Relief<'_>, at: &At) {
+        if let Some(normal) = relief.normal {
             normal.check(self, at.key("normal"));
+        }
+        if let Some(bump) = relief.bump {
+            bump.check(self, at.key("bump"));
         }
     }
 

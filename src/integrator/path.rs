@@ -18,6 +18,7 @@ pub use tracer::PathTracer;
 use std::ops::Range;
 
 use crate::bsdf::{Bsdf, ScatterSample};
+use crate::camera::Cone;
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
@@ -42,7 +43,7 @@ impl<const F: u32> PathTracer<'_, F> {
     /// and the mean of the branches behind it.
     pub fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult {
         let mut found = Found::default();
-        let mut trunk = Path::from_camera(ray);
+        let mut trunk = Path::from_camera(ray, self.cone(&ray));
         let Some(surface) = self.next_surface(&mut trunk, &mut found) else {
             return PathResult::of(found);
         };
@@ -78,6 +79,13 @@ impl<const F: u32> PathTracer<'_, F> {
         result.add(light);
         result.branches = spread;
         result
+    }
+
+    fn cone(&self, ray: &Ray) -> Cone {
+        match &self.scene.camera {
+            Some(camera) if has::<F>(Features::FOOTPRINTS) => camera.cone(ray.direction),
+            _ => Cone::default(),
+        }
     }
 
     /// The mean of the branches with these indices, from the surface that `trunk` has
@@ -126,7 +134,10 @@ impl<const F: u32> PathTracer<'_, F> {
                 path.deposit(emitted, &mut found.radiance);
                 return None;
             };
-            let surface = self.scene.surface::<F>(&path.ray, &hit);
+            let mut surface = self.scene.surface::<F>(&path.ray, &hit);
+            if has::<F>(Features::FOOTPRINTS) {
+                surface.footprint = path.cone.at(hit.t);
+            }
             path.to_surface = hit.t;
             if has::<F>(Features::ABSORPTION) && !path.media.is_empty() {
                 path.deposit(emitted, &mut found.radiance);
@@ -220,6 +231,7 @@ impl<const F: u32> PathTracer<'_, F> {
         path.vertex += 1;
         path.bounce += 1;
         path.ray = surface.spawn(sample.wi);
+        path.cone.width = surface.footprint;
         path.multiple |= sample.order > 1;
         path.kind = match has::<F>(Features::RAY_VISIBILITY) {
             true => sample.kind,

@@ -3,6 +3,7 @@
 use super::polygons::Triangulation;
 use super::{LineProblem, Mesh, Repair, Wanted};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// In metres. Embree refuses coordinates beyond 1.8e18.
 const FARTHEST: f32 = 1e18;
@@ -63,9 +64,12 @@ pub(super) fn assemble(
         normals: has_normals.then(|| Vec::with_capacity(vertices)),
         uvs: has_uvs.then(|| Vec::with_capacity(vertices)),
         tangents: None,
+        uv_maps: BTreeMap::new(),
+        colors: BTreeMap::new(),
         material_of_triangle: (names.len() > 1).then(|| Vec::with_capacity(triangles)),
         material_names: names,
     };
+    let mut colors = wanted.colors.then(Vec::new);
     let mut incomplete = 0;
     let mut uvs_replaced = 0;
     let mut triangulation = Triangulation::default();
@@ -102,6 +106,13 @@ pub(super) fn assemble(
                 uvs.resize(uvs.len() + count, [f32::NAN; 2]);
             }
         }
+        if let Some(colors) = &mut colors {
+            colors.extend(
+                part.vertex_color
+                    .chunks_exact(3)
+                    .map(|c| [c[0], c[1], c[2]]),
+            );
+        }
         if let Some(materials) = &mut mesh.material_of_triangle {
             let id = part.material_id.unwrap_or(nameless) as u16;
             materials.resize(materials.len() + added, id);
@@ -123,6 +134,10 @@ pub(super) fn assemble(
         )));
     }
     let replaced = mend_normals(&mut mesh);
+    // Without normals, as colours are read, no vertex was added since.
+    if let Some(colors) = colors {
+        mesh.colors.insert(String::new(), colors);
+    }
 
     let counted = [
         (

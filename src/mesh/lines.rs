@@ -169,12 +169,17 @@ impl<R: BufRead> Lines<R> {
     ) -> Result<Parts, Refusal> {
         let absent =
             |kind: usize, wanted: bool| wanted && self.counts[kind] == 0 && self.named[kind] > 0;
-        let Wanted { uvs, normals } = self.wanted;
+        let Wanted {
+            uvs,
+            normals,
+            colors,
+        } = self.wanted;
         let (no_uvs, no_normals) = (absent(1, uvs), absent(2, normals));
         if (no_uvs || no_normals) && !self.ended {
             let present = Wanted {
                 uvs: uvs && !no_uvs,
                 normals: normals && !no_normals,
+                colors,
             };
             let mut repairs = Vec::new();
             if no_uvs {
@@ -347,6 +352,7 @@ impl<R: BufRead> Lines<R> {
         let end = line.iter().position(|byte| byte.is_ascii_whitespace());
         let (keyword, rest) = line.split_at(end.unwrap_or(line.len()));
         match keyword {
+            b"v" if self.wanted.colors => self.numbers("v", rest, [6, 6], 0),
             b"v" => self.numbers("v", rest, [3, 3], 0),
             b"vt" if self.wanted.uvs => self.numbers("vt", rest, [1, 2], 1),
             b"vn" if self.wanted.normals => self.numbers("vn", rest, [3, 3], 2),
@@ -391,16 +397,16 @@ impl<R: BufRead> Lines<R> {
             && values
                 .iter()
                 .all(|byte| byte.is_ascii_digit() || b" \t.-+".contains(byte));
-        let mut words = [&b""[..]; 4];
+        let mut words = [&b""[..]; 6];
         let mut found = 0;
         for word in Words(values) {
-            if found < 4 {
+            if found < words.len() {
                 words[found] = word;
             }
             found += 1;
         }
-        // A fourth number alone is a weight; six are a position and a colour,
-        // which nobody looks at.
+        // A fourth number alone is a weight; six are a position and a colour, which
+        // few look at.
         let kept = if kind == 0 && found == 4 { 4 } else { most };
         for word in &words[..found.min(kept)] {
             let word = if plain {
@@ -427,7 +433,8 @@ impl<R: BufRead> Lines<R> {
         {
             // What follows counts on the vertex.
             self.block.text.truncate(self.start);
-            self.hand_on(format_args!("{keyword} 0 0 0"));
+            let color = if kind == 0 && most == 6 { " 0 0 0" } else { "" };
+            self.hand_on(format_args!("{keyword} 0 0 0{color}"));
         }
     }
 

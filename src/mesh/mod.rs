@@ -8,9 +8,11 @@ mod assemble;
 mod feed;
 mod lines;
 mod polygons;
+mod side;
 mod tangents;
 
 use lines::Refusal;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
@@ -31,12 +33,25 @@ pub struct Mesh {
     /// v; zero where texture coordinates have no direction. Only
     /// [`Mesh::add_tangents`] makes them.
     pub tangents: Option<Vec<[f32; 4]>>,
+    /// Other texture coordinates by name, see [`Mesh::add_uv_map`].
+    pub uv_maps: BTreeMap<String, UvMap>,
+    /// Colours of vertices by name, as stored, see [`Mesh::add_colors`].
+    pub colors: BTreeMap<String, Vec<[f32; 3]>>,
     /// For each triangle an index into `material_names`; absent when all have
     /// the first name, or there is none.
     pub material_of_triangle: Option<Vec<u16>>,
     /// The `usemtl` names in the order of their first use; `""` stands for
     /// faces before the first of them.
     pub material_names: Vec<String>,
+}
+
+/// Texture coordinates beside a mesh's first ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UvMap {
+    /// For each vertex, v upwards.
+    pub uvs: Vec<[f32; 2]>,
+    /// As [`Mesh::tangents`].
+    pub tangents: Option<Vec<[f32; 4]>>,
 }
 
 /// What is to be read beside positions.
@@ -46,13 +61,16 @@ pub struct Wanted {
     pub uvs: bool,
     /// Normals; without them shading is flat.
     pub normals: bool,
+    /// Colours of vertices, which then all must have one.
+    pub colors: bool,
 }
 
 impl Wanted {
-    /// All that the file has.
+    /// All that the file has for shapes and textures.
     pub const ALL: Self = Self {
         uvs: true,
         normals: true,
+        colors: false,
     };
 }
 

@@ -4,56 +4,26 @@
 use super::Mesh;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::Vec3;
-use std::collections::HashMap;
 
 impl Mesh {
     /// Gives every vertex a tangent, splitting those whose corners differ, as at the
     /// seam of a mirrored texture. Without texture coordinates there is none.
     pub fn add_tangents(&mut self) {
-        let Some(uvs) = &self.uvs else {
-            return;
-        };
-        let corners = tangents(self, uvs);
-        self.tangents = Some(self.per_vertex(&corners));
+        if let Some(uvs) = &self.uvs {
+            let corners = tangents(self, uvs);
+            self.tangents = Some(self.per_vertex(&corners));
+        }
     }
 
-    /// Values of corners as values of vertices. A vertex whose corners differ is split.
-    fn per_vertex<const N: usize>(&mut self, corners: &[[f32; N]]) -> Vec<[f32; N]> {
-        let mut triangles = std::mem::take(&mut self.triangles);
-        let mut values: Vec<Option<[f32; N]>> = vec![None; self.positions.len()];
-        let mut split = HashMap::new();
-        for (index, value) in triangles.as_flattened_mut().iter_mut().zip(corners) {
-            let bits = value.map(f32::to_bits);
-            let known = values[*index as usize].get_or_insert(*value);
-            if known.map(f32::to_bits) == bits {
-                continue;
+    /// The same for other texture coordinates.
+    pub fn add_tangents_of(&mut self, uv_map: &str) {
+        if let Some(map) = self.uv_maps.get(uv_map) {
+            let corners = tangents(self, &map.uvs);
+            let tangents = self.per_vertex(&corners);
+            if let Some(map) = self.uv_maps.get_mut(uv_map) {
+                map.tangents = Some(tangents);
             }
-            let copy = split.entry((*index, bits)).or_insert_with(|| {
-                values.push(Some(*value));
-                self.copy_vertex(*index as usize)
-            });
-            *index = *copy;
         }
-        self.triangles = triangles;
-        self.positions.reserve(1);
-        let none = [0.0; N];
-        values.into_iter().map(|v| v.unwrap_or(none)).collect()
-    }
-
-    /// The index of a new vertex that is like this one.
-    fn copy_vertex(&mut self, vertex: usize) -> u32 {
-        fn copy<T: Copy>(values: &mut Vec<T>, index: usize) {
-            values.push(values[index]);
-        }
-        let index = self.positions.len() as u32;
-        copy(&mut self.positions, vertex);
-        if let Some(normals) = &mut self.normals {
-            copy(normals, vertex);
-        }
-        if let Some(uvs) = &mut self.uvs {
-            copy(uvs, vertex);
-        }
-        index
     }
 }
 

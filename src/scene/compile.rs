@@ -7,13 +7,14 @@ mod principled;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use arrayvec::ArrayVec;
 
+use super::attributes::Attributes;
 use super::material::{
-    Facet, Factor, Leaf, Material, NormalMap, Number, Perturbation, Reflectance, RoughMaterial,
-    Roughness, Tangent, Tint, WeightedLeaf,
+    Bump, Facet, Factor, Leaf, Material, NormalMap, Number, Perturbation, Reflectance,
+    RoughMaterial, Roughness, Tangent, Tint, VertexColors, WeightedLeaf,
 };
 use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, WhiteFacets};
 use crate::color::Rgb;
@@ -30,6 +31,14 @@ pub enum MaterialError {
     /// A name that is not among the materials.
     #[error("there is no material `{0}`")]
     UnknownMaterial(String),
+    /// Slopes on a surface that is not made of facets.
+    #[error(
+        "`filter: slopes` is for `conductor`, `dielectric`, `refraction`, `rough_diffuse` and `diffuse` without roughness"
+    )]
+    NotRough,
+    /// Colours of vertices where an image is needed.
+    #[error("the texture `{0}` is no image: normals and heights come from images")]
+    NoImage(String),
     /// A name that is not among the textures.
     #[error("there is no texture `{0}`")]
     UnknownTexture(String),
@@ -54,6 +63,10 @@ pub struct Needs {
     pub uvs: bool,
     /// Whether it looks along the axes of texture coordinates that normal maps have.
     pub tangents: bool,
+    /// Other texture coordinates that it looks at, and whether along their axes.
+    pub uv_maps: BTreeMap<String, bool>,
+    /// Colours of vertices that it looks at.
+    pub colors: BTreeSet<String>,
     /// What a kernel has to have.
     pub features: Features,
     /// What is rendered otherwise than the file says, for people.
@@ -74,9 +87,12 @@ pub struct Compiled {
 pub struct Materials<'a> {
     described: &'a BTreeMap<String, desc::Material>,
     estimator: desc::Estimator,
+    attributes: Attributes,
     known_textures: &'a BTreeMap<String, desc::Texture>,
     /// Names of the textures in use, by their index.
     textures: Vec<String>,
+    /// Those of them whose slopes are averaged.
+    filtered: BTreeSet<String>,
     compiled: BTreeMap<String, Result<Compiled, MaterialError>>,
 }
 
@@ -87,8 +103,10 @@ impl<'a> Materials<'a> {
         Self {
             described: &description.materials,
             estimator: description.sampling.estimator,
+            attributes: Attributes::of(description),
             known_textures: &description.textures,
             textures: Vec::new(),
+            filtered: BTreeSet::new(),
             compiled: BTreeMap::new(),
         }
     }
@@ -111,6 +129,18 @@ impl<'a> Materials<'a> {
         self.described.keys().map(String::as_str)
     }
 
+    /// The numbers of UV maps and colours.
+    #[must_use]
+    pub fn attributes(&self) -> &Attributes {
+        &self.attributes
+    }
+
+    /// Whether the slopes of a texture of this name are averaged.
+    #[must_use]
+    pub fn is_filtered(&self, texture: &str) -> bool {
+        self.filtered.contains(texture)
+    }
+
     /// Names of the textures that compiled materials look up, in the order of
     /// their indices.
     #[must_use]
@@ -124,7 +154,9 @@ impl<'a> Materials<'a> {
             described: self.described,
             known_textures: Some(self.known_textures),
             estimator: self.estimator,
+            attributes: self.attributes.clone(),
             textures: std::mem::take(&mut self.textures),
+            filtered: BTreeSet::new(),
             needs: Needs::default(),
             leaves: Vec::new(),
             closures: 0,
@@ -134,6 +166,7 @@ impl<'a> Materials<'a> {
         };
         let result = compiler.add(material, &Above::default());
         self.textures = std::mem::take(&mut compiler.textures);
+        self.filtered.append(&mut compiler.filtered);
         if result.is_err() {
             self.textures.truncate(textured);
         }
@@ -153,7 +186,9 @@ pub fn compile_alone(
         described: &BTreeMap::new(),
         known_textures: None,
         estimator,
+        attributes: Attributes::default(),
         textures: Vec::new(),
+        filtered: BTreeSet::new(),
         needs: Needs::default(),
         leaves: Vec::new(),
         closures: 0,
@@ -201,7 +236,9 @@ struct Compiler<'a> {
     described: &'a BTreeMap<String, desc::Material>,
     known_textures: Option<&'a BTreeMap<String, desc::Texture>>,
     estimator: desc::Estimator,
+    attributes: Attributes,
     textures: Vec<String>,
+    filtered: BTreeSet<String>,
     needs: Needs,
     leaves: Vec<WeightedLeaf>,
     /// How many closures the leaves come to at the most.
@@ -235,7 +272,7 @@ impl<'a> Compiler<'a> {
 
     /// Adds the leaves of a material.
     fn add(&mut self, material: &desc::Material, above: &Above) -> Result<(), MaterialError> {
-        let leaf = match material {
+        let mut leaf = match material {
             desc::Material::Mix(mix) => {
                 let factor = self.factor(&mix.factor)?;
                 for (child, is_b) in [(&mix.a, false), (&mix.b, true)] {
@@ -310,7 +347,7 @@ impl<'a> Compiler<'a> {
         if self.closures > MAX_CLOSURES {
             return Err(MaterialError::TooManyClosures);
         }
-        let perturbation = self.perturbation(material)?;
+        let perturbation = self.perturbation(material, &mut leaf)?;
         self.leaves.push(WeightedLeaf {
             share: above.share,
             factors: above.factors.clone(),
@@ -320,21 +357,77 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
+    /// What slopes that are averaged need, and the roughness that stands for them.
+    fn filter_slopes(&mut self, texture: &str, leaf: &mut Leaf) -> Result<(), MaterialError> {
+        self.need_if(Features::FOOTPRINTS, true);
+        self.filtered.insert(texture.to_owned());
+        if let Leaf::Lambert(tint) = *leaf {
+            let facet = Facet::Matte(tint);
+            let distribution = Distribution::Beckmann;
+            *leaf = Leaf::Rough(RoughMaterial {
+                distribution,
+                roughness: Roughness::Alpha(Number::Constant(0.0), Number::Constant(0.0)),
+                rotation: Number::Constant(0.0),
+                tangent: Tangent::Any,
+                facet,
+                method: self.method(desc::Scattering::Multiple, distribution, facet)?,
+            });
+        }
+        let Leaf::Rough(rough) = leaf else {
+            return Err(MaterialError::NotRough);
+        };
+        self.need_if(Features::MULTIPLE_SCATTERING, rough.method.is_multiple());
+        self.need_if(rough.distribution.feature(), true);
+        self.need_if(rough.facet.kind().feature(), true);
+        Ok(())
+    }
+
     fn perturbation(
         &mut self,
         material: &desc::Material,
+        leaf: &mut Leaf,
     ) -> Result<Option<Box<Perturbation>>, MaterialError> {
-        let Some(map) = material.normal() else {
+        let relief = material.relief();
+        if relief.is_flat() {
             return Ok(None);
-        };
+        }
         self.need_if(Features::NORMAL_MAPS, true);
-        self.needs.tangents |= map.space == desc::NormalSpace::Tangent;
-        let normal = NormalMap {
-            texture: self.texture(&map.texture)?,
-            strength: self.number(&map.strength)?,
-            space: map.space,
+        let normal = match relief.normal {
+            None => None,
+            Some(map) => {
+                if map.space == desc::NormalSpace::Tangent {
+                    match self.image(&map.texture)?.uv_map.clone() {
+                        Some(uv_map) => drop(self.needs.uv_maps.insert(uv_map, true)),
+                        None => self.needs.tangents = true,
+                    }
+                }
+                let filtered = map.filter == desc::NormalFilter::Slopes;
+                if filtered {
+                    self.filter_slopes(&map.texture, leaf)?;
+                }
+                Some(NormalMap {
+                    texture: self.texture(&map.texture)?,
+                    filtered,
+                    strength: self.number(&map.strength)?,
+                    space: map.space,
+                })
+            }
         };
-        Ok(Some(Box::new(Perturbation { normal })))
+        let bump = match relief.bump {
+            None => None,
+            Some(bump) => {
+                self.need_if(Features::FOOTPRINTS, true);
+                Some(Bump {
+                    texture: self.texture(&bump.texture)?,
+                    channel: bump.channel,
+                    strength: self.number(&bump.strength)?,
+                    distance: self.number(&bump.distance)?,
+                    sign: if bump.invert { -1.0 } else { 1.0 },
+                    filter_width: bump.filter_width,
+                })
+            }
+        };
+        Ok(Some(Box::new(Perturbation { normal, bump })))
     }
 
     fn add_part(&mut self, part: &desc::MaterialRef, above: &Above) -> Result<(), MaterialError> {
@@ -369,14 +462,27 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    /// The texture of this name.
+    fn described(&self, name: &str) -> Result<&'a desc::Texture, MaterialError> {
+        let known = self.known_textures.and_then(|known| known.get(name));
+        known.ok_or_else(|| MaterialError::UnknownTexture(name.to_owned()))
+    }
+
+    /// The same where it must be an image.
+    fn image(&self, name: &str) -> Result<&'a desc::ImageTexture, MaterialError> {
+        let image = self.described(name)?.image();
+        image.ok_or_else(|| MaterialError::NoImage(name.to_owned()))
+    }
+
+    /// The index of an image.
     fn texture(&mut self, name: &str) -> Result<usize, MaterialError> {
-        if !self
-            .known_textures
-            .is_some_and(|known| known.contains_key(name))
-        {
-            return Err(MaterialError::UnknownTexture(name.to_owned()));
+        match &self.image(name)?.uv_map {
+            Some(uv_map) => {
+                self.need_if(Features::ATTRIBUTES, true);
+                self.needs.uv_maps.entry(uv_map.clone()).or_default();
+            }
+            None => self.needs.uvs = true,
         }
-        self.needs.uvs = true;
         self.lookups += 1;
         if let Some(index) = self.textures.iter().position(|known| known == name) {
             return Ok(index);
@@ -385,19 +491,41 @@ impl<'a> Compiler<'a> {
         Ok(self.textures.len() - 1)
     }
 
+    /// The colours of vertices that a texture stands for.
+    fn colors(&mut self, name: &str) -> Result<Option<VertexColors>, MaterialError> {
+        let desc::Texture::Colors {
+            colors,
+            color_space,
+        } = self.described(name)?
+        else {
+            return Ok(None);
+        };
+        self.need_if(Features::ATTRIBUTES, true);
+        self.needs.colors.insert(colors.clone());
+        self.lookups += 1;
+        Ok(Some(VertexColors {
+            set: self.attributes.colors(colors),
+            color_space: *color_space,
+        }))
+    }
+
     fn number(&mut self, scalar: &desc::Scalar) -> Result<Number, MaterialError> {
         match scalar {
             desc::Scalar::Value(value) => Ok(Number::Constant(*value)),
-            desc::Scalar::Texture { name, channel } => {
-                Ok(Number::Texture(self.texture(name)?, *channel))
-            }
+            desc::Scalar::Texture { name, channel } => Ok(match self.colors(name)? {
+                Some(colors) => Number::Colors(colors, *channel),
+                None => Number::Texture(self.texture(name)?, *channel),
+            }),
         }
     }
 
     fn tint(&mut self, color: &desc::Color) -> Result<Tint, MaterialError> {
         match color {
             desc::Color::Value(value) => Ok(Tint::Constant(Rgb::from(*value))),
-            desc::Color::Texture(name) => Ok(Tint::Texture(self.texture(name)?)),
+            desc::Color::Texture(name) => Ok(match self.colors(name)? {
+                Some(colors) => Tint::Colors(colors),
+                None => Tint::Texture(self.texture(name)?),
+            }),
         }
     }
 

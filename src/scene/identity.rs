@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 use super::load::Assets;
-use crate::description::{Description, Film, Object, Sampling, Texture, World};
+use crate::description::{Description, Film, ImageTexture, Object, Sampling, World};
 use crate::embree;
 use crate::film::Identity;
 use crate::mesh::Mesh as Triangles;
@@ -40,7 +40,7 @@ pub(super) fn identity(
         lights,
         frames: _,
         directory: _,
-        perturbed: _,
+        places: _,
     } = description;
     let Film {
         width,
@@ -105,10 +105,10 @@ pub(super) fn identity(
         let Some(texture) = textures.get(name) else {
             continue;
         };
-        let described = Texture {
+        let described = texture.image().map(|image| ImageTexture {
             file: PathBuf::new(),
-            ..texture.clone()
-        };
+            ..image.clone()
+        });
         add(format!("texture `{name}`"), of_value(&(described, content)));
     }
     if let Some(built) = built {
@@ -132,7 +132,7 @@ impl Contents {
     pub fn of(description: &Description, assets: &Assets) -> Self {
         let meshes = assets.meshes.iter();
         let textures = assets.textures.keys().filter_map(|name| {
-            let file = &description.textures.get(name)?.file;
+            let file = &description.textures.get(name)?.image()?.file;
             Some((name.clone(), of_files(&description.resolve_path(file))))
         });
         let image = assets.environment.as_ref();
@@ -180,6 +180,8 @@ fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
         uvs,
         // They follow from the rest.
         tangents: _,
+        uv_maps,
+        colors,
         material_of_triangle,
         material_names,
     } = mesh;
@@ -187,6 +189,14 @@ fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
     for index in triangles.as_flattened() {
         indices.update(&index.to_le_bytes());
     }
+    let uv_maps: Vec<_> = uv_maps
+        .iter()
+        .map(|(name, map)| (name.clone(), of_floats(map.uvs.as_flattened())))
+        .collect();
+    let colors: Vec<_> = colors
+        .iter()
+        .map(|(name, colors)| (name.clone(), of_floats(colors.as_flattened())))
+        .collect();
     let slots = material_of_triangle.as_ref().map(|slots| {
         let bytes: Vec<u8> = slots.iter().flat_map(|slot| slot.to_le_bytes()).collect();
         xxh3_128(&bytes)
@@ -198,6 +208,8 @@ fn of_mesh(mesh: &Triangles) -> impl std::fmt::Debug {
         uvs.as_ref().map(|uvs| of_floats(uvs.as_flattened())),
         slots,
         material_names.clone(),
+        uv_maps,
+        colors,
     )
 }
 

@@ -1,16 +1,17 @@
 //! Files that a description names, read in parallel, all errors together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::compile::Materials;
+use super::attributes::Attributes;
+use super::compile::{Materials, Needs};
 use super::error::ResolveError;
 use super::stage::Stage;
-use crate::description::{self, Assignment, Description, Object, Placing, World};
+use crate::description::{self, Assignment, Description, ImageTexture, Object, Placing, World};
 use crate::memory::Budget;
-use crate::mesh::{Mesh, Wanted};
+use crate::mesh::{Mesh, Repair, Wanted};
 use crate::texture::{EnvironmentImage, Images, Lookup, Texture, UvTransform, load_environment};
 
 /// The contents of a scene's files.
@@ -48,10 +49,12 @@ impl Assets {
             .par_iter()
             .filter(|(name, _)| !stage.has_mesh(name))
             .filter_map(|(name, used)| {
-                let path = description.resolve_path(&description.meshes.get(name)?.file);
+                let described = description.meshes.get(name)?;
+                let path = description.resolve_path(&described.file);
                 let wanted = Wanted {
                     uvs: used.uvs,
                     normals: true,
+                    colors: false,
                 };
                 // A mesh takes about as much as its text.
                 let length = std::fs::metadata(&path).map_or(0, |file| file.len());
@@ -59,25 +62,34 @@ impl Assets {
                     .take(length, format!("the mesh {}", path.display()))
                     .map_err(|e| e.to_string())
                     .and_then(|()| Mesh::load(&path, wanted).map_err(|e| e.to_string()));
-                let loaded = loaded.and_then(|(mut mesh, repairs)| {
-                    if used.tangents {
-                        add_tangents(&mut mesh, &path, budget)?;
-                    }
+                let loaded = loaded.and_then(|(mut mesh, mut repairs)| {
+                    let add = |mesh: &mut Mesh| used.add(mesh, described, description, budget);
+                    repairs.extend(add(&mut mesh)?);
                     Ok((mesh, repairs))
                 });
                 Some((name.clone(), loaded))
             })
             .collect();
         let images = Images::new(budget);
+        let attributes = materials.attributes();
         let textures: Vec<_> = materials
             .textures()
             .par_iter()
             .filter(|name| !stage.has_texture(name))
             .filter_map(|name| {
-                let texture = description.textures.get(name)?;
+                let texture = description.textures.get(name)?.image()?;
                 let path = description.resolve_path(&texture.file);
-                let loaded = images.texture(&path, lookup(texture));
-                Some((name.clone(), loaded.map_err(|e| e.to_string())))
+                let loaded = images.texture(&path, lookup(texture, attributes));
+                let loaded =
+                    loaded
+                        .map_err(|e| e.to_string())
+                        .and_then(|(mut texture, repairs)| {
+                            if materials.is_filtered(name) {
+                                average_slopes(&mut texture, &path, budget)?;
+                            }
+                            Ok((texture, repairs))
+                        });
+                Some((name.clone(), loaded))
             })
             .collect();
         let environment = match &description.world {
@@ -132,7 +144,7 @@ impl Assets {
     }
 }
 
-fn lookup(texture: &description::Texture) -> Lookup {
+fn lookup(texture: &ImageTexture, attributes: &Attributes) -> Lookup {
     Lookup {
         color_space: texture.color_space,
         interpolation: texture.interpolation,
@@ -146,18 +158,24 @@ fn lookup(texture: &description::Texture) -> Lookup {
             } => UvTransform::from_parts(scale, rotation, offset),
             Placing::Matrix(rows) => UvTransform::from_rows(rows),
         },
+        uv_map: attributes.uv_map(texture.uv_map.as_deref()),
     }
 }
 
-fn add_tangents(mesh: &mut Mesh, path: &Path, budget: &Budget) -> Result<(), String> {
-    // The algorithm's own, for each corner, by measurement.
-    const BYTES_PER_CORNER: u64 = 100;
-    let bytes = 3 * BYTES_PER_CORNER * mesh.triangles.len() as u64;
-    budget
-        .take(bytes, format!("the tangents of {}", path.display()))
-        .map_err(|e| e.to_string())?;
-    mesh.add_tangents();
-    Ok(())
+fn average_slopes(texture: &mut Texture, path: &Path, budget: &Budget) -> Result<(), String> {
+    const BYTES_PER_PIXEL: u64 = 36;
+    let [width, height] = texture.size().map(|side| side as u64);
+    let what = format!("the slopes of {}", path.display());
+    let taken = budget.take(BYTES_PER_PIXEL * width * height, what);
+    taken.map_err(|error| error.to_string())?;
+    if texture.average_slopes() {
+        Ok(())
+    } else {
+        Err(format!(
+            "{}: `filter: slopes` takes one image, not tiles",
+            path.display()
+        ))
+    }
 }
 
 /// What objects reach.
@@ -165,30 +183,87 @@ fn add_tangents(mesh: &mut Mesh, path: &Path, budget: &Budget) -> Result<(), Str
 struct Used {
     /// By name.
     meshes: BTreeMap<String, UsedMesh>,
+    attributes: Attributes,
 }
 
 /// What materials look at of a mesh.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct UsedMesh {
     uvs: bool,
     tangents: bool,
+    /// And whether their tangents.
+    uv_maps: BTreeMap<String, bool>,
+    colors: BTreeSet<String>,
+}
+
+impl UsedMesh {
+    fn with(&mut self, needs: &Needs) {
+        self.uvs |= needs.uvs;
+        self.tangents |= needs.tangents;
+        for (name, tangents) in &needs.uv_maps {
+            *self.uv_maps.entry(name.clone()).or_default() |= tangents;
+        }
+        self.colors.extend(needs.colors.iter().cloned());
+    }
+
+    /// Adds to a mesh what stands in other files, as far as the description has it, and
+    /// tangents.
+    fn add(
+        &self,
+        mesh: &mut Mesh,
+        described: &description::Mesh,
+        description: &Description,
+        budget: &Budget,
+    ) -> Result<Vec<Repair>, String> {
+        // For each corner, the most that takes: Mikkelsen's algorithm, measured.
+        const BYTES_PER_CORNER: u64 = 100;
+        let corners = 3 * mesh.triangles.len() as u64;
+        let take = |what: &str, file: &Path| {
+            let what = format!("{what} of the mesh {}", file.display());
+            let taken = budget.take(BYTES_PER_CORNER * corners, what);
+            taken.map_err(|error| error.to_string())
+        };
+        let mut repairs = Vec::new();
+        for name in self.uv_maps.keys() {
+            if let Some(file) = described.uv_maps.get(name) {
+                take("an UV map", file)?;
+                let path = description.resolve_path(file);
+                repairs.extend(mesh.add_uv_map(name, &path).map_err(|e| e.to_string())?);
+            }
+        }
+        for name in &self.colors {
+            if let Some(file) = described.colors.get(name) {
+                take("colours", file)?;
+                let path = description.resolve_path(file);
+                repairs.extend(mesh.add_colors(name, &path).map_err(|e| e.to_string())?);
+            }
+        }
+        if self.tangents {
+            take("the tangents", &described.file)?;
+            mesh.add_tangents();
+        }
+        for (name, _) in self.uv_maps.iter().filter(|(_, tangents)| **tangents) {
+            take("the tangents", &described.file)?;
+            mesh.add_tangents_of(name);
+        }
+        Ok(repairs)
+    }
 }
 
 impl Used {
     fn by(description: &Description, materials: &mut Materials<'_>) -> Self {
-        let mut used = Self::default();
+        let mut used = Self {
+            attributes: materials.attributes().clone(),
+            ..Self::default()
+        };
         for object in &description.objects {
-            let mut mesh = UsedMesh::default();
+            let mesh = used.meshes.entry(object.mesh.clone()).or_default();
             for name in materials_of(object, materials) {
                 // What is wrong with it is told when an object turns out to have it.
                 if let Some(Ok(compiled)) = materials.get(&name) {
-                    mesh.uvs |= compiled.needs.uvs;
-                    mesh.tangents |= compiled.needs.tangents;
+                    mesh.with(&compiled.needs);
                 }
             }
-            let known = used.meshes.entry(object.mesh.clone()).or_default();
-            known.uvs |= mesh.uvs;
-            known.tangents |= mesh.tangents;
         }
         used
     }
@@ -197,8 +272,9 @@ impl Used {
     fn keys(&self, description: &Description, stage: &Stage) -> BTreeMap<String, String> {
         let places = stage.places(description);
         let meshes = self.meshes.iter().filter_map(|(name, used)| {
-            let file = &description.meshes.get(name)?.file;
-            let content = format!("{name:?} {file:?} {used:?}");
+            let mesh = description.meshes.get(name)?;
+            // The numbers of what they look at count, too.
+            let content = format!("{name:?} {mesh:?} {used:?} {:?}", self.attributes);
             let place = places.get(name.as_str()).and_then(Option::as_ref);
             Some((name.clone(), Stage::key(&content, place)))
         });

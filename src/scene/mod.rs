@@ -1,6 +1,7 @@
 //! The scene as it is rendered: immutable, indices for names, radiometric
 //! quantities for the file's units, nothing that no ray asks for.
 
+mod attributes;
 mod compile;
 mod error;
 mod identity;
@@ -12,12 +13,14 @@ mod stage;
 mod surface;
 mod transform;
 
+pub use attributes::Attributes;
 pub use compile::{Compiled, MaterialError, Materials, Needs, compile_alone};
 pub use error::ResolveError;
 pub use load::Assets;
 pub use material::{
-    Facet, Factor, Ground, Leaf, Material, NormalMap, Number, Perturbation, Point, Reflectance,
-    RoughMaterial, Roughness, Tangent, Tint, WeightedLeaf, blender_alphas,
+    Bump, Facet, Factor, Ground, Leaf, Material, NormalMap, Number, Perturbation, Point,
+    Reflectance, RoughMaterial, Roughness, Tangent, Tint, VertexColors, WeightedLeaf,
+    blender_alphas,
 };
 pub use resolve::{Resolved, assemble, resolve, resolve_within};
 pub use settings::{Limits, RenderSettings};
@@ -35,6 +38,7 @@ use crate::color::Rgb;
 use crate::embree::{Accelerator, Hit, Ray, Vertices};
 use crate::features::{Features, has};
 use crate::light::{Lights, Receiver};
+use crate::mesh::UvMap;
 use crate::rays::RayKinds;
 use crate::texture::Texture;
 
@@ -53,6 +57,10 @@ pub struct SceneMesh {
     /// See [`crate::mesh::Mesh::tangents`]; in the objects' space, wherever the
     /// positions are.
     pub tangents: Option<Vec<[f32; 4]>>,
+    /// Other texture coordinates by their number, see [`Attributes::uv_map`], from 1.
+    pub uv_maps: Vec<Option<UvMap>>,
+    /// Colours of vertices by their number, see [`Attributes::colors`].
+    pub colors: Vec<Option<Vec<[f32; 3]>>>,
     /// For each triangle, which of the object's materials it has; all have the
     /// first without it.
     pub slots: Option<Vec<u16>>,
@@ -67,6 +75,41 @@ impl SceneMesh {
             + self.normals.as_deref().map_or(0, size_of_val)
             + self.uvs.as_deref().map_or(0, size_of_val)
             + self.slots.as_deref().map_or(0, size_of_val)
+            + self.attribute_bytes()
+    }
+
+    /// The bytes that tangents, UV maps and colours take.
+    #[must_use]
+    pub fn attribute_bytes(&self) -> usize {
+        let tangents =
+            |tangents: &Option<Vec<[f32; 4]>>| tangents.as_deref().map_or(0, size_of_val);
+        let maps = self.uv_maps.iter().flatten();
+        let maps = maps.map(|map| size_of_val(&*map.uvs) + tangents(&map.tangents));
+        let colors = self
+            .colors
+            .iter()
+            .flatten()
+            .map(|colors| size_of_val(&**colors));
+        tangents(&self.tangents) + maps.sum::<usize>() + colors.sum::<usize>()
+    }
+
+    /// The texture coordinates of this number.
+    #[must_use]
+    #[inline]
+    pub fn uvs(&self, map: usize) -> Option<&[[f32; 2]]> {
+        match map {
+            0 => self.uvs.as_deref(),
+            _ => Some(&self.uv_maps.get(map - 1)?.as_ref()?.uvs),
+        }
+    }
+
+    /// The tangents along them.
+    #[must_use]
+    pub fn tangents(&self, map: usize) -> Option<&[[f32; 4]]> {
+        match map {
+            0 => self.tangents.as_deref(),
+            _ => self.uv_maps.get(map - 1)?.as_ref()?.tangents.as_deref(),
+        }
     }
 }
 
@@ -195,6 +238,7 @@ impl Scene {
             object: object_index,
             triangle: hit.triangle,
             weights: Vec2::new(u, v),
+            footprint: 0.0,
             along_u,
             right_handed,
             in_box,
@@ -298,6 +342,8 @@ impl Scene {
         let point = Point {
             ground: self.ground(index as usize),
             uv,
+            triangle: emitter - first,
+            weights: Vec2::new(u, v),
             cos: cos.abs(),
             front: cos >= 0.0,
             camera: false,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Mat3A, Vec3, Vec3A};
 
+use super::attributes::Attributes;
 use super::compile::Materials;
 use super::error::ResolveError;
 use super::identity::{Contents, identity};
@@ -265,18 +266,40 @@ impl<'a> MaterialTable<'a> {
         }
     }
 
-    /// Where the first of these materials that perturbs normals says so.
-    fn perturbed_among(
-        &self,
-        indices: &[usize],
-        places: &BTreeMap<String, String>,
-    ) -> Option<String> {
-        let mut names = self
-            .indices
-            .iter()
-            .filter(|(_, index)| indices.contains(index) && self.compiled[**index].is_perturbed());
-        let (name, _) = names.next()?;
-        Some(places.get(name).unwrap_or(name).clone())
+    /// What the first of these materials that is not content with a mesh asks for, as
+    /// [`Description::places`] has it.
+    fn lack(&mut self, indices: &[usize], mesh: &SceneMesh) -> Option<String> {
+        let names: Vec<_> = self.indices.iter().collect();
+        for (name, index) in names {
+            if !indices.contains(index) {
+                continue;
+            }
+            let Some(Ok(compiled)) = self.source.get(name) else {
+                continue;
+            };
+            let needs = &compiled.needs;
+            let flat = !needs.features.contains(Features::NORMAL_MAPS);
+            if !flat && needs.uvs && mesh.uvs.is_none() {
+                return Some(format!("material {name}"));
+            }
+            let (uv_maps, colors) = (needs.uv_maps.clone(), needs.colors.clone());
+            let attributes = self.source.attributes();
+            for map in uv_maps.keys() {
+                if mesh.uvs(attributes.uv_map(Some(map))).is_none() {
+                    return Some(format!("UV map {map}"));
+                }
+            }
+            for color in &colors {
+                if mesh
+                    .colors
+                    .get(attributes.colors(color))
+                    .is_none_or(Option::is_none)
+                {
+                    return Some(format!("set of colours {color}"));
+                }
+            }
+        }
+        None
     }
 
     /// The index of the material of this name; `None` if there is no such name.
@@ -318,8 +341,8 @@ struct Placing<'a> {
     placed: BTreeMap<String, (usize, usize, Vec<String>)>,
     /// Indices into `scene_meshes`.
     shared: Vec<usize>,
-    /// See [`Description::perturbed`].
-    perturbed: &'a BTreeMap<String, String>,
+    /// See [`Description::places`].
+    places: &'a BTreeMap<String, String>,
 }
 
 impl<'a> Placing<'a> {
@@ -340,7 +363,7 @@ impl<'a> Placing<'a> {
             lent: Vec::new(),
             placed: BTreeMap::new(),
             shared: Vec::new(),
-            perturbed: &description.perturbed,
+            places: &description.places,
         }
     }
 
@@ -382,7 +405,7 @@ impl<'a> Placing<'a> {
                     };
                     let place = alone.then_some((&to_world, &normal_to_world));
                     KeptMesh {
-                        mesh: scene_mesh(mesh, place),
+                        mesh: scene_mesh(mesh, place, materials.source.attributes()),
                         lent,
                     }
                 }
@@ -401,13 +424,17 @@ impl<'a> Placing<'a> {
         }
         let (mesh, shared, slots) = self.placed[&object.mesh].clone();
         let material_indices = assign(&object.materials, &slots, name, materials)?;
-        if self.scene_meshes[mesh].uvs.is_none() {
-            if let Some(place) = materials.perturbed_among(&material_indices, self.perturbed) {
-                return Err(format!(
-                    "{place}: this needs texture coordinates, and the mesh `{}` of {name} has none",
-                    object.mesh
-                ));
-            }
+        if let Some(lack) = materials.lack(&material_indices, &self.scene_meshes[mesh]) {
+            let place = self.places.get(&lack).map_or("", String::as_str);
+            let lacks = if lack.starts_with("material ") {
+                "texture coordinates"
+            } else {
+                &lack
+            };
+            return Err(format!(
+                "{place}: this needs {lacks}, which the mesh `{}` of {name} lacks",
+                object.mesh
+            ));
         }
         let geometry = if alone {
             Geometry::Mesh {
@@ -484,7 +511,12 @@ fn assign(
 
 /// The mesh as the scene keeps it, moved to world space if one object has it
 /// for itself.
-fn scene_mesh(mesh: Mesh, place: Option<(&Affine3A, &Mat3A)>) -> SceneMesh {
+fn scene_mesh(
+    mesh: Mesh,
+    place: Option<(&Affine3A, &Mat3A)>,
+    attributes: &Attributes,
+) -> SceneMesh {
+    let (mut uv_maps, mut colors) = (mesh.uv_maps, mesh.colors);
     let mut positions = mesh.positions;
     let mut normals = mesh.normals;
     if let Some((to_world, normal_to_world)) = place {
@@ -503,6 +535,14 @@ fn scene_mesh(mesh: Mesh, place: Option<(&Affine3A, &Mat3A)>) -> SceneMesh {
         normals,
         uvs: mesh.uvs,
         tangents: mesh.tangents,
+        uv_maps: attributes
+            .uv_maps()
+            .map(|(_, name)| uv_maps.remove(name))
+            .collect(),
+        colors: attributes
+            .color_names()
+            .map(|name| colors.remove(name))
+            .collect(),
         slots: mesh.material_of_triangle,
     }
 }

@@ -32,6 +32,8 @@ pub struct Surface {
     pub triangle: u32,
     /// Barycentric weights of the triangle's second and third corner.
     pub weights: Vec2,
+    /// How wide a pixel is here, across the ray, metres; zero where nothing needs it.
+    pub footprint: f32,
     /// ∂position/∂u, not normalised; zero where nothing needs it.
     pub along_u: Vec3,
     /// Whether ∂position/∂u, ∂position/∂v and the normal are right-handed: not so
@@ -86,6 +88,7 @@ impl Surface {
             object: 0,
             triangle: 0,
             weights: Vec2::ZERO,
+            footprint: 0.0,
             along_u: Vec3::X,
             right_handed: from_above,
             in_box: Vec3::X,

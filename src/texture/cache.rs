@@ -43,7 +43,12 @@ impl<'a> Images<'a> {
             repairs.extend(mended);
         }
         let images = Tiles::new(images);
-        Ok((Texture { images, lookup }, repairs))
+        let texture = Texture {
+            images,
+            lookup,
+            slopes: None,
+        };
+        Ok((texture, repairs))
     }
 
     fn image(&self, path: &Path) -> Loaded {

@@ -72,7 +72,7 @@ impl Alpha {
 /// From texture coordinates to places of the image, whose lower left corner is at
 /// (0, 0) and whose upper right one at (1, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UvTransform([[f64; 3]; 2]);
+pub struct UvTransform(pub(super) [[f64; 3]; 2]);
 
 impl Default for UvTransform {
     fn default() -> Self {
@@ -127,6 +127,8 @@ pub struct Lookup {
     pub alpha: Alpha,
     /// From texture coordinates to the image.
     pub transform: UvTransform,
+    /// Which of a mesh's texture coordinates are meant, 0 for its first.
+    pub uv_map: usize,
 }
 
 impl Extension {

@@ -4,17 +4,20 @@ mod cache;
 mod hdr;
 mod load;
 mod lookup;
+mod slopes;
 mod tiles;
 
 pub use cache::Images;
 pub use load::{EnvironmentImage, load_environment};
 pub use lookup::{Alpha, ColorSpace, Extension, Interpolation, Lookup, UvTransform};
+pub use slopes::Slopes;
 pub use tiles::files;
 
 use crate::memory::Budget;
 use exr::prelude::f16;
 use lookup::b_spline;
 use serde::Deserialize;
+use slopes::SlopeMaps;
 use std::collections::HashSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -38,11 +41,39 @@ pub enum Channel {
     Luminance,
 }
 
+impl Channel {
+    /// This part of red, green, blue and alpha.
+    #[must_use]
+    pub fn of(self, [r, g, b, a]: [f32; 4]) -> f32 {
+        match self {
+            Self::R => r,
+            Self::G => g,
+            Self::B => b,
+            Self::A => a,
+            // Rec. 709, section 3.
+            Self::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+        }
+    }
+}
+
+impl ColorSpace {
+    /// A stored value as a linear one.
+    #[must_use]
+    pub fn decode(self, value: f32) -> f32 {
+        match self {
+            Self::Srgb => srgb_to_linear(value),
+            Self::Linear | Self::NonColor => value,
+        }
+    }
+}
+
 /// Images on the plane of texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     images: Tiles,
     lookup: Lookup,
+    /// Of normal maps that are filtered.
+    slopes: Option<Arc<SlopeMaps>>,
 }
 
 /// Pixels as they are stored, row by row from the top, channels interleaved:
@@ -110,6 +141,11 @@ impl Texture {
         Images::new(&Budget::of_machine()).texture(path, lookup)
     }
 
+    /// Which of a mesh's texture coordinates it wants, 0 for the first.
+    pub fn uv_map(&self) -> usize {
+        self.lookup.uv_map
+    }
+
     /// In pixels, width and height; of several images, of the first.
     pub fn size(&self) -> [usize; 2] {
         let image = self.images.first();
@@ -124,7 +160,31 @@ impl Texture {
             .flat_map(|texture| texture.images.all())
             .filter(|image| seen.insert(Arc::as_ptr(image)))
             .map(|image| image.memory())
-            .sum()
+            .sum::<usize>()
+            + textures
+                .iter()
+                .filter_map(|texture| Some(texture.slopes.as_ref()?.memory()))
+                .sum::<usize>()
+    }
+
+    /// Averages the slopes of a texture of normals, for [`Texture::slopes`]. That takes
+    /// about 36 bytes for each pixel. Several images can't be averaged: false.
+    pub fn average_slopes(&mut self) -> bool {
+        let is_one = matches!(self.images, Tiles::One(_));
+        if is_one {
+            self.slopes = Some(Arc::new(SlopeMaps::of(self)));
+        }
+        is_one
+    }
+
+    /// The slopes of a texture of normals under a footprint at texture coordinates, of
+    /// such an area in their units; `None` where they were not averaged.
+    #[must_use]
+    pub fn slopes(&self, uv: [f32; 2], area: f32) -> Option<Slopes> {
+        let maps = self.slopes.as_ref()?;
+        let [width, height] = self.size();
+        let pixels = f64::from(area) * self.lookup.transform.area() * (width * height) as f64;
+        Some(maps.at(self.lookup.transform.apply(uv), pixels.sqrt() as f32))
     }
 
     /// Linear red, green and blue, and alpha, at texture coordinates with v upwards:
@@ -199,9 +259,7 @@ impl Texture {
             if self.lookup.alpha.divides() && alpha != 0.0 && alpha != 1.0 {
                 *channel /= alpha;
             }
-            if self.lookup.color_space == ColorSpace::Srgb {
-                *channel = srgb_to_linear(*channel);
-            }
+            *channel = self.lookup.color_space.decode(*channel);
         }
     }
 
@@ -226,15 +284,7 @@ impl Texture {
 
     /// One channel of [`Texture::sample`].
     pub fn channel(&self, uv: [f32; 2], channel: Channel) -> f32 {
-        let [r, g, b, a] = self.sample(uv);
-        match channel {
-            Channel::R => r,
-            Channel::G => g,
-            Channel::B => b,
-            Channel::A => a,
-            // Rec. 709, section 3.
-            Channel::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
-        }
+        channel.of(self.sample(uv))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::media::Media;
 use super::result::Found;
 use crate::bsdf::ByOrder;
+use crate::camera::Cone;
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::light::Receiver;
@@ -28,6 +29,9 @@ pub(super) struct Path {
     pub media: Media,
     /// What its ray is seen as: by the last scattering.
     pub kind: RayKind,
+    /// How wide a pixel is along the ray, where something needs it; reflection and
+    /// refraction leave it its spread.
+    pub cone: Cone,
 }
 
 /// The last vertex that light samples could have continued from.
@@ -44,7 +48,7 @@ pub(super) struct Vertex {
 }
 
 impl Path {
-    pub fn from_camera(ray: Ray) -> Self {
+    pub fn from_camera(ray: Ray, cone: Cone) -> Self {
         Self {
             ray,
             throughput: Rgb::ONE,
@@ -59,6 +63,7 @@ impl Path {
             to_surface: 0.0,
             media: Media::default(),
             kind: RayKind::Camera,
+            cone,
         }
     }
 
@@ -71,6 +76,7 @@ impl Path {
             t_far,
             ..surface.spawn(self.ray.direction)
         };
+        self.cone.width = surface.footprint;
     }
 
     /// Nothing is there: what the camera's ray carries is what the film lets through.

@@ -13,10 +13,10 @@ mod walked;
 pub use factor::Factor;
 pub use layers::{BaseLayer, InterfaceLayer, LayeredMaterial, Layers, Relief, Slab};
 pub use openpbr::OpenPbr;
-pub use perturbation::{NormalMap, Perturbation};
+pub use perturbation::{Bump, NormalMap, Perturbation};
 pub use principled::{Layering, Principled3, Principled4, Setup};
 pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
-pub use value::{Ground, Number, Point, Tint};
+pub use value::{Ground, Number, Point, Tint, VertexColors};
 
 use arrayvec::ArrayVec;
 use glam::Vec3;
@@ -118,9 +118,13 @@ impl Material {
                 }
                 _ => None,
             };
-            let (surface, point) = match &perturbed {
-                Some(surface) => (surface, Point::shaded(ground, surface, view)),
-                None => (surface, even),
+            let (surface, point, spread) = match &perturbed {
+                Some((surface, spread)) => (
+                    surface,
+                    Point::shaded(ground, surface, view),
+                    spread.as_ref(),
+                ),
+                None => (surface, even, None),
             };
             let seen = || seen_by_closures(surface.normal, surface.geometric_normal, view.wo);
             // Layers are weighed by the albedo of what lies on them.
@@ -141,10 +145,17 @@ impl Material {
                     Closure::Transparent(tint.at::<F>(&point)),
                     Frame::about(surface.geometric_normal),
                 ),
-                Leaf::Rough(rough) => (
-                    rough.closure::<F>(&point),
-                    rough.tangent.frame::<F>(rough.rotation, &point, surface),
-                ),
+                Leaf::Rough(rough) => {
+                    let frame = rough.tangent.frame::<F>(rough.rotation, &point, surface);
+                    match spread {
+                        None => (rough.closure::<F>(&point), frame),
+                        Some(spread) => {
+                            let alphas = rough.roughness.alphas::<F>(&point);
+                            let (alphas, frame) = spread.widen(alphas, frame);
+                            (rough.closure_of::<F>(&point, alphas), frame)
+                        }
+                    }
+                }
                 Leaf::Layered(layers) if has::<F>(Features::LAYERS) => {
                     match layers.closure::<F>(&point, surface) {
                         Some(closure) => closure,
@@ -258,7 +269,7 @@ impl Material {
             .iter()
             .map(|weighted| {
                 let normal = match &weighted.perturbation {
-                    Some(perturbation) => perturbation.surface::<ALL>(point, surface).normal,
+                    Some(perturbation) => perturbation.surface::<ALL>(point, surface).0.normal,
                     None => surface.normal,
                 };
                 normal * weighted.share_at::<ALL>(point)

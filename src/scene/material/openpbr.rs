@@ -168,7 +168,7 @@ impl OpenPbr {
     pub(super) fn emission_strength(&self) -> Number {
         match self.emission_luminance {
             Number::Constant(luminance) => Number::Constant(luminance / LUMENS_PER_WATT),
-            texture @ Number::Texture(..) => texture,
+            texture @ (Number::Texture(..) | Number::Colors(..)) => texture,
         }
     }
 

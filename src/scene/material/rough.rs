@@ -214,7 +214,12 @@ pub struct RoughMaterial {
 impl RoughMaterial {
     #[inline]
     pub(super) fn closure<const F: u32>(&self, point: &Point<'_>) -> Closure {
-        let alphas = self.roughness.alphas::<F>(point);
+        self.closure_of::<F>(point, self.roughness.alphas::<F>(point))
+    }
+
+    /// The same of other roughnesses.
+    #[inline]
+    pub(super) fn closure_of<const F: u32>(&self, point: &Point<'_>, alphas: [f32; 2]) -> Closure {
         let smooth = alphas == [0.0; 2];
         // A groove: smooth one way only. The model has no such limit; this is
         // far below what f32 directions resolve.

@@ -5,8 +5,7 @@ use glam::Vec2;
 use super::super::{Object, SceneMesh, Surface, View};
 use crate::color::{Rgb, luminance};
 use crate::features::{Features, has};
-use crate::texture::Channel;
-use crate::texture::Texture;
+use crate::texture::{Channel, ColorSpace, Texture};
 
 /// What the values of materials are looked up in.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,8 +21,12 @@ pub struct Ground<'a> {
 pub struct Point<'a> {
     /// What it is on.
     pub ground: Ground<'a>,
-    /// Texture coordinates.
+    /// The first texture coordinates.
     pub uv: Vec2,
+    /// The triangle within the mesh.
+    pub triangle: u32,
+    /// Barycentric weights of its second and third corner.
+    pub weights: Vec2,
     /// The cosine between the normal and the viewer, either way round: an interpolated
     /// normal may face away, and nodes take it for the other side then.
     pub cos: f32,
@@ -40,6 +43,8 @@ impl<'a> Point<'a> {
         Self {
             ground: Ground::default(),
             uv: Vec2::ZERO,
+            triangle: 0,
+            weights: Vec2::ZERO,
             cos: 1.0,
             front: true,
             camera: false,
@@ -53,6 +58,8 @@ impl<'a> Point<'a> {
         Self {
             ground,
             uv: surface.uv,
+            triangle: surface.triangle,
+            weights: surface.weights,
             cos: surface.normal.dot(view.wo).abs(),
             front: surface.front,
             camera: view.camera,
@@ -71,6 +78,62 @@ impl<'a> Point<'a> {
     }
 }
 
+impl Point<'_> {
+    /// What a texture says here.
+    #[inline]
+    fn sample<const F: u32>(&self, index: usize) -> [f32; 4] {
+        let texture = &self.ground.textures[index];
+        texture.sample(self.uv_of::<F>(texture.uv_map()).into())
+    }
+
+    /// The texture coordinates of this number.
+    #[inline]
+    pub(super) fn uv_of<const F: u32>(&self, map: usize) -> Vec2 {
+        if !has::<F>(Features::ATTRIBUTES) || map == 0 {
+            return self.uv;
+        }
+        let uvs = self.ground.on.and_then(|(_, mesh)| mesh.uvs(map));
+        uvs.map_or(Vec2::ZERO, |uvs| {
+            let [a, b, c] = self.corners(uvs).map(Vec2::from);
+            let [u, v] = self.weights.into();
+            a * (1.0 - u - v) + b * u + c * v
+        })
+    }
+
+    /// Colours of vertices here; black where the mesh has none of the name.
+    fn color(&self, VertexColors { set, color_space }: VertexColors) -> Rgb {
+        let colors = self
+            .ground
+            .on
+            .and_then(|(_, mesh)| mesh.colors.get(set)?.as_deref());
+        colors.map_or(Rgb::ZERO, |colors| {
+            let decode = |color: [f32; 3]| Rgb::from(color.map(|c| color_space.decode(c)));
+            let [a, b, c] = self.corners(colors).map(decode);
+            let [u, v] = self.weights.into();
+            a * (1.0 - u - v) + b * u + c * v
+        })
+    }
+
+    /// What the triangle's corners have.
+    fn corners<T: Copy + Default>(&self, values: &[T]) -> [T; 3] {
+        match self.ground.on {
+            Some((_, mesh)) => {
+                mesh.triangles[self.triangle as usize].map(|index| values[index as usize])
+            }
+            None => [T::default(); 3],
+        }
+    }
+}
+
+/// Colours of vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VertexColors {
+    /// The number of their name among all of the scene.
+    pub set: usize,
+    /// How they become linear, before they are interpolated.
+    pub color_space: ColorSpace,
+}
+
 /// A number at every point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
@@ -78,6 +141,8 @@ pub enum Number {
     Constant(f32),
     /// A channel of the scene's texture of this index.
     Texture(usize, Channel),
+    /// A channel of colours of vertices.
+    Colors(VertexColors, Channel),
 }
 
 impl Number {
@@ -87,9 +152,13 @@ impl Number {
         match self {
             Self::Constant(value) => value,
             Self::Texture(index, channel) if has::<F>(Features::TEXTURES) => {
-                point.ground.textures[index].channel(point.uv.into(), channel)
+                channel.of(point.sample::<F>(index))
             }
-            Self::Texture(..) => left_out(),
+            Self::Colors(colors, channel) if has::<F>(Features::ATTRIBUTES) => {
+                let [r, g, b] = point.color(colors).into();
+                channel.of([r, g, b, 1.0])
+            }
+            Self::Texture(..) | Self::Colors(..) => left_out(),
         }
     }
 
@@ -103,6 +172,7 @@ impl Number {
     pub(super) fn mean(self, textures: &[Texture]) -> f32 {
         match self {
             Self::Constant(value) => value,
+            Self::Colors(..) => UNKNOWN_MEAN,
             Self::Texture(index, channel) => {
                 let [r, g, b] = textures[index].mean();
                 match channel {
@@ -135,6 +205,8 @@ pub enum Tint {
     Constant(Rgb),
     /// Red, green and blue of the scene's texture of this index.
     Texture(usize),
+    /// Colours of vertices.
+    Colors(VertexColors),
 }
 
 impl Tint {
@@ -143,11 +215,12 @@ impl Tint {
     pub(super) fn at<const F: u32>(self, point: &Point<'_>) -> Rgb {
         match self {
             Self::Constant(value) => value,
-            Self::Texture(..) if !has::<F>(Features::TEXTURES) => left_out(),
-            Self::Texture(index) => {
-                let [r, g, b, _] = point.ground.textures[index].sample(point.uv.into());
+            Self::Texture(index) if has::<F>(Features::TEXTURES) => {
+                let [r, g, b, _] = point.sample::<F>(index);
                 Rgb::new(r, g, b)
             }
+            Self::Colors(colors) if has::<F>(Features::ATTRIBUTES) => point.color(colors),
+            Self::Texture(..) | Self::Colors(..) => left_out(),
         }
     }
 
@@ -160,10 +233,15 @@ impl Tint {
     pub(super) fn mean(self, textures: &[Texture]) -> Rgb {
         match self {
             Self::Constant(color) => color,
+            Self::Colors(_) => Rgb::splat(UNKNOWN_MEAN),
             Self::Texture(index) => Rgb::from(textures[index].mean()),
         }
     }
 }
+
+/// What stands for the mean of colours of vertices, which differs from mesh to mesh:
+/// how much light is expected decides about its samples alone.
+const UNKNOWN_MEAN: f32 = 0.5;
 
 /// Where a kernel lacks a feature of its scene, which it is chosen not to.
 #[cold]
