@@ -131,6 +131,7 @@ class Job:
         self.progress = progress
         self.composited = not by_engine and settings.has_compositor(scene)
         self.border = scene.render.use_border
+        self.stereo = scene.render.use_multiview
         self.has_camera = scene.camera is not None
         self.bake = bake
         self.by_engine = by_engine  # Blender itself sees to the compositor, the region, other view layers
@@ -240,6 +241,8 @@ class Job:
             options = settings.options(scene)
         finally:
             render.use_border = border
+        if self.stereo:
+            log.warn("scene", "of the views of stereo rendering the camera's own is written")
         others = [l.name for l in scene.view_layers if l.use and l.name != depsgraph.view_layer.name]
         if others and not self.by_engine:
             log.warn("scene", f'only view layer "{depsgraph.view_layer.name}" is written, not '
@@ -315,6 +318,9 @@ class Job:
         view.accept("visible_camera", "is_holdout", "is_shadow_catcher", *(f"visible_{kind}" for kind in lights.RAYS))
         if ob.is_shadow_catcher and ob.type != "LIGHT":  # lights have the flag by default
             self.log.warn(where, "shadow catcher is left out: the object is seen")
+        if getattr(self.scene.cycles, "feature_set", "EXPERIMENTAL") == "EXPERIMENTAL" \
+                and getattr(getattr(ob, "cycles", None), "use_adaptive_subdivision", False):
+            self.log.warn(where, "adaptive subdivision is written with the modifier's levels")
         for what in self.audit.leftovers(ob):
             self.log.warn(where, f"{what}: left out")
 

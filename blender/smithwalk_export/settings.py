@@ -20,7 +20,7 @@ _ACCEPTED = (
     "view_settings", "smithwalk", "cycles.samples", "cycles.seed", "cycles.time_limit", "cycles.volume_step_rate", "cycles.volume_bounces",
     "cycles.volume_max_steps", "cycles.dicing_rate", "cycles.max_subdivisions", "cycles.dicing_camera",
     "cycles.film_transparent_glass", "cycles.film_transparent_roughness", "cycles.rolling_shutter_type",
-    "cycles.rolling_shutter_duration", "cycles.motion_blur_position", "cycles.transparent_max_bounces",
+    "cycles.rolling_shutter_duration", "cycles.motion_blur_position",
     "cycles.bake_type", "cycles.pixel_filter_type", "cycles.filter_width", "cycles.fast_gi_method",
     "cycles.camera_cull_margin", "cycles.distance_cull_margin", "cycles.use_camera_cull",
     "cycles.use_distance_cull", "cycles.samples",
@@ -140,6 +140,10 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
                 "render.film_transparent", "render.use_motion_blur", "cycles.use_fast_gi")
     if render.use_simplify and (cycles.use_camera_cull or getattr(cycles, "use_distance_cull", False)):
         log.warn("scene", "culling by camera or distance is left out: more objects than in Blender")
+    if render.use_simplify and getattr(cycles, "texture_limit_render", "OFF") != "OFF":
+        log.warn("scene", f"the texture limit of {cycles.texture_limit_render} pixels is left out: whole images")
+    if render.use_freestyle and view_layer.use_freestyle:
+        log.warn("scene", "Freestyle's lines are left out")
     if composited:
         log.warn("scene", "the compositor is left out")
     if scene.sequence_editor and len(getattr(scene.sequence_editor, "strips",
