@@ -39,7 +39,8 @@ _NUMBERS = {
           "specular_ior_level": (0.5, 0.0, None), "anisotropic": (0.0, 0.0, 1.0),
           "transmission_weight": (0.0, 0.0, 1.0), "coat_weight": (0.0, 0.0, 1.0),
           "coat_roughness": (0.03, 0.0, 1.0), "coat_ior": (1.5, 1.0, None), "sheen_weight": (0.0, 0.0, 1.0),
-          "sheen_roughness": (0.5, 0.0, 1.0), "emission_strength": (0.0, 0.0, None)},
+          "sheen_roughness": (0.5, 0.0, 1.0), "emission_strength": (0.0, 0.0, None),
+          "thin_film_thickness": (0.0, 0.0, None), "thin_film_ior": (1.33, 1e-5, None)},
 }
 _COLORS = {
     3.4: {"base_color": 0.8, "subsurface_color": 0.8, "emission": 0.0},

@@ -74,6 +74,7 @@ impl<const F: u32> Bsdf<F> {
     ///
     /// # Panics
     /// Past [`MAX_CLOSURES`], which scenes are checked for when they are resolved.
+    #[inline(always)]
     pub fn push(&mut self, part: WeightedClosure) {
         if part.chance > 0.0 {
             self.total += part.chance;

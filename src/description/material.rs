@@ -88,6 +88,13 @@ pub enum Reflectance {
         /// The reflectance at cos θ = 1/7.
         f82: Color,
     },
+    /// Complex indices below a thin film.
+    Film {
+        /// The film.
+        film: ThinFilm,
+        /// The metal: [`Self::Metal`] or [`Self::Complex`].
+        below: Box<Reflectance>,
+    },
     /// The same, as Blender's nodes say it.
     EdgeTint {
         /// At normal incidence.
@@ -95,6 +102,21 @@ pub enum Reflectance {
         /// The factor on Schlick's value at cos θ = 1/7.
         tint: Color,
     },
+}
+
+/// A film whose two reflections interfere.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThinFilm {
+    /// Index of refraction, absolute.
+    #[serde(default = "water")]
+    pub ior: Scalar,
+    /// Thickness in nm.
+    pub thickness: Scalar,
+}
+
+fn water() -> Scalar {
+    Scalar::Value(1.33)
 }
 
 /// A metal with known indices of refraction.
@@ -441,6 +463,7 @@ raw_rough! {
         f0: Option<Color>,
         f82: Option<Color>,
         edge_tint: Option<Color>,
+        thin_film: Option<ThinFilm>,
     }
     RawDielectric {
         ior: Option<Scalar>,
@@ -494,6 +517,21 @@ impl TryFrom<RawConductor> for Conductor {
             },
             (.., None, Some(_)) => return Err(Clash::new("f82", "`f82` needs `f0`")),
             (.., None, None) => Reflectance::Color(raw.color.unwrap_or(Color::WHITE)),
+        };
+        let reflectance = match (raw.thin_film, reflectance) {
+            (None, reflectance) => reflectance,
+            (Some(film), below @ (Reflectance::Metal(_) | Reflectance::Complex { .. })) => {
+                Reflectance::Film {
+                    film,
+                    below: Box::new(below),
+                }
+            }
+            _ => {
+                return Err(Clash::new(
+                    "thin_film",
+                    "`thin_film` needs `metal`, or `eta` and `k`: a film on a colour has no phase",
+                ));
+            }
         };
         Ok(Self { rough, reflectance })
     }
@@ -649,7 +687,23 @@ impl MaterialRef {
 impl Conductor {
     fn check(&self, check: &mut Check<'_, '_>, at: At) {
         self.rough.check(check, &at);
-        match &self.reflectance {
+        self.reflectance.check(check, &at);
+    }
+}
+
+impl Reflectance {
+    fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+        match self {
+            Self::Film { film, below } => {
+                let film_at = at.key("thin_film");
+                check.scalar(&film.ior, Range::Positive, film_at.key("ior"));
+                check.scalar(
+                    &film.thickness,
+                    Range::NonNegative,
+                    film_at.key("thickness"),
+                );
+                below.check(check, at);
+            }
             Reflectance::Color(color) => check.color(color, Range::UNIT, at.key("color")),
             Reflectance::Metal(_) => {}
             Reflectance::Complex { eta, k } => {

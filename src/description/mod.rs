@@ -36,7 +36,7 @@ pub use layered::{Interface, Layered, Slab};
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
     Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,
-    Reflectance, RoughDiffuse, Sheen, Sum, Translucent, Velvet,
+    Reflectance, RoughDiffuse, Sheen, Sum, ThinFilm, Translucent, Velvet,
 };
 pub use openpbr::OpenPbr;
 pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Version};

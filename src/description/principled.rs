@@ -179,6 +179,7 @@ raw! {
     emission_strength
     diffuse_roughness subsurface_weight specular_ior_level transmission_weight coat_weight
     coat_roughness coat_ior coat_tint sheen_weight sheen_roughness emission_color
+    thin_film_thickness thin_film_ior
 }
 
 /// Declares a node's sockets with their defaults and ranges.
@@ -296,6 +297,10 @@ node! {
         sheen_roughness: Scalar = 0.5, Range::UNIT;
         /// A factor on the sheen.
         sheen_tint: Color = 1.0, Range::NonNegative;
+        /// Thickness of a film on the interface, nm.
+        thin_film_thickness: Scalar = 0.0, Range::NonNegative;
+        /// Its index of refraction.
+        thin_film_ior: Scalar = 1.33, Range::Positive;
         /// Radiance over `emission_strength`.
         emission_color: Color = 1.0, Range::NonNegative;
         /// W·m⁻²·sr⁻¹.

@@ -557,6 +557,15 @@ impl<'a> Compiler<'a> {
                 f0: self.tint(f0)?,
                 f82: self.tint(f82)?,
             },
+            desc::Reflectance::Film { film, below } => match self.metal(below)? {
+                Reflectance::Complex { eta, k } => Reflectance::Film {
+                    ior: self.number(&film.ior)?,
+                    thickness: self.number(&film.thickness)?,
+                    eta,
+                    k,
+                },
+                _ => unreachable!("a film lies on complex indices"),
+            },
             desc::Reflectance::EdgeTint { f0, tint } => Reflectance::EdgeTint {
                 f0: self.tint(f0)?,
                 tint: self.tint(tint)?,

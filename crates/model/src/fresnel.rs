@@ -1,6 +1,6 @@
 //! Reflectance of a smooth interface at a micro-facet.
 
-use super::{Real, Rgb};
+use super::{Film, Real, Rgb};
 
 /// Reflectance of unpolarised light at a dielectric interface, and the cosine
 /// of the refracted ray: (F, cosθ_t), for the cosine `cos` ≥ 0 of incidence
@@ -157,6 +157,15 @@ pub enum ConductorFresnel<F> {
         /// Reflectance at grazing incidence and under total reflection.
         f90: Rgb<F>,
     },
+    /// A thin film on metal, or on a dielectric whose inside is dark.
+    Film {
+        /// The film.
+        film: Film<F>,
+        /// Real part of the index below it, relative to the outside.
+        eta: Rgb<F>,
+        /// Extinction coefficient below it.
+        k: Rgb<F>,
+    },
 }
 
 impl<F: Real> ConductorFresnel<F> {
@@ -177,6 +186,7 @@ impl<F: Real> ConductorFresnel<F> {
                 let rise = rise(cos, eta);
                 f0 * (F::one() - rise) + f90 * rise
             }
+            Self::Film { film, eta, k } => film.reflectance(cos, eta, k),
         }
     }
 }
@@ -200,6 +210,14 @@ impl ConductorFresnel<f64> {
                 eta: eta as f32,
                 f0: rgb(f0),
                 f90: rgb(f90),
+            },
+            Self::Film { film, eta, k } => ConductorFresnel::Film {
+                film: Film {
+                    ior: film.ior as f32,
+                    thickness: film.thickness as f32,
+                },
+                eta: rgb(eta),
+                k: rgb(k),
             },
         }
     }

@@ -55,6 +55,7 @@
 
 mod draw;
 mod facets;
+mod film;
 mod first_order;
 pub mod fresnel;
 pub mod heights;
@@ -84,6 +85,7 @@ pub use draw::{Draw, Stream};
 pub use facets::{
     At, Bounce, Conductor, Dielectric, Diffuse, Facets, Glass, Phase, Refraction, Side,
 };
+pub use film::Film;
 pub use fresnel::ConductorFresnel;
 pub use lanes::{BeckmannLanes, Directions, GgxLanes, LANES, NdfInLanes, NdfLanes};
 pub use ndf::*;

@@ -161,6 +161,16 @@ impl Compiler<'_> {
         if sockets.subsurface_weight != desc::Scalar::Value(0.0) {
             self.note("subsurface scattering is a diffuse base of the same colour");
         }
+        let thin_film_thickness = self.number(&sockets.thin_film_thickness)?;
+        if !thin_film_thickness.is(0.0) {
+            if node.layering == desc::Layering::Walks {
+                self.note("a thin film is left out by walks");
+            } else if sockets.transmission_weight != desc::Scalar::Value(0.0)
+                || sockets.metallic != desc::Scalar::Value(0.0)
+            {
+                self.note("a thin film on glass or metal of the node is left out");
+            }
+        }
         let sheen_weight = self.number(&sockets.sheen_weight)?;
         self.need_if(Features::DIFFUSERS, !sheen_weight.is(0.0));
         let transmits = !transmission_weight.is(0.0);
@@ -182,6 +192,8 @@ impl Compiler<'_> {
             coat_roughness: self.number(&sockets.coat_roughness)?,
             coat_ior: self.number(&sockets.coat_ior)?,
             coat_tint: self.tint(&sockets.coat_tint)?,
+            thin_film_thickness,
+            thin_film_ior: self.number(&sockets.thin_film_ior)?,
             sheen_weight,
             sheen_roughness: self.number(&sockets.sheen_roughness)?,
             sheen_tint: self.tint(&sockets.sheen_tint)?,

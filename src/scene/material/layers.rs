@@ -271,5 +271,10 @@ fn clamped(fresnel: ConductorFresnel<f32>) -> ConductorFresnel<f32> {
             eta: eta.map(|c| c.max(LEAST_IOR)),
             k: k.map(|c| c.max(0.0)),
         },
+        ConductorFresnel::Film { film, eta, k } => ConductorFresnel::Film {
+            film,
+            eta: eta.map(|c| c.max(LEAST_IOR)),
+            k: k.map(|c| c.max(0.0)),
+        },
     }
 }

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::super::Surface;
-use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, to_model_color};
+use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, film, to_model_color};
 use super::value::{Number, Point, Tint};
 use super::walked::{self, FixedStacks, Walked};
 use crate::bsdf::{
@@ -105,6 +105,8 @@ pub struct Principled4 {
     pub sheen_weight: Number,
     pub sheen_roughness: Number,
     pub sheen_tint: Tint,
+    pub thin_film_thickness: Number,
+    pub thin_film_ior: Number,
     pub emission_color: Tint,
     pub emission_strength: Number,
 }
@@ -315,12 +317,22 @@ impl Principled4 {
         let (f0, eta) = leveled(ior, level);
         if eta != 1.0 && weight.max_element() > 0.0 {
             let f0 = (tint * f0).clamp(Rgb::ZERO, Rgb::ONE);
-            let fresnel = ConductorFresnel::Dielectric {
-                eta,
-                f0: to_model_color(f0),
-                f90: to_model_color(Rgb::ONE),
+            let thickness = self.thin_film_thickness.at::<F>(point);
+            let (fresnel, own) = if thickness > NONE {
+                let fresnel = ConductorFresnel::Film {
+                    film: film(self.thin_film_ior.at::<F>(point), thickness),
+                    eta: to_model_color(Rgb::splat(eta)),
+                    k: to_model_color(Rgb::ZERO),
+                };
+                (fresnel, Rgb::from(fresnel.reflectance(point.cos).0))
+            } else {
+                let fresnel = ConductorFresnel::Dielectric {
+                    eta,
+                    f0: to_model_color(f0),
+                    f90: to_model_color(Rgb::ONE),
+                };
+                (fresnel, self.layer(alphas, point.cos, eta, f0, method))
             };
-            let own = self.layer(alphas, point.cos, eta, f0, method);
             stack.push(reflecting(alphas, fresnel, method), frame, weight, own);
             weight *= (1.0 - own.max_element()).clamp(0.0, 1.0);
         }

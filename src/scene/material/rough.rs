@@ -10,7 +10,7 @@ use crate::color::Rgb;
 use crate::description::Axis;
 use crate::features::{Features, has};
 use smithwalk_model::{
-    self as model, Conductor, ConductorFresnel, Dielectric, Diffuse, Refraction,
+    self as model, Conductor, ConductorFresnel, Dielectric, Diffuse, Film, Refraction,
 };
 
 /// How rough, in the two languages of the files.
@@ -94,6 +94,17 @@ pub enum Reflectance {
         /// The factor.
         tint: Tint,
     },
+    /// A thin film on a metal of complex indices.
+    Film {
+        /// The film's index of refraction.
+        ior: Number,
+        /// Its thickness, nm.
+        thickness: Number,
+        /// η.
+        eta: Tint,
+        /// k.
+        k: Tint,
+    },
 }
 
 impl Reflectance {
@@ -104,6 +115,12 @@ impl Reflectance {
             Self::Complex { eta: a, k: b }
             | Self::F82 { f0: a, f82: b }
             | Self::EdgeTint { f0: a, tint: b } => a.is_fixed() && b.is_fixed(),
+            Self::Film {
+                ior,
+                thickness,
+                eta,
+                k,
+            } => ior.is_fixed() && thickness.is_fixed() && eta.is_fixed() && k.is_fixed(),
         }
     }
 
@@ -122,9 +139,30 @@ impl Reflectance {
                 f82: at(f82),
             },
             Self::EdgeTint { f0, tint } => edge_tinted(f0.at::<F>(point), tint.at::<F>(point)),
+            Self::Film {
+                ior,
+                thickness,
+                eta,
+                k,
+            } => ConductorFresnel::Film {
+                film: film(ior.at::<F>(point), thickness.at::<F>(point)),
+                eta: at(eta),
+                k: at(k),
+            },
         }
     }
 }
+
+/// A film of this index and this thickness in nm, as textures may say it.
+pub(super) fn film(ior: f32, thickness: f32) -> Film<f32> {
+    Film {
+        ior: ior.max(LEAST_IOR),
+        thickness: thickness.clamp(0.0, MOST_NANOMETRES),
+    }
+}
+
+/// Thicker films have no colours left.
+const MOST_NANOMETRES: f32 = 1e6;
 
 /// Schlick's curve from `f0`, multiplied by `tint` at cosθ = 1/7: "F82-tint" of
 /// Kutz et al. 2021, "Novel aspects of the Adobe Standard Material".

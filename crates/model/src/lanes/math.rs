@@ -97,6 +97,10 @@ pub(super) fn reflectance(fresnel: &ConductorFresnel<f32>, cos: f32x8) -> [f32x8
             .fast_max(f32x8::ZERO);
             each(&|c| f32x8::from(f0.0[c]) + rise * f32x8::from(f90.0[c] - f0.0[c]))
         }
+        ConductorFresnel::Film { .. } => {
+            let lanes = cos.to_array().map(|cos| fresnel.reflectance(cos).0);
+            each(&|c| f32x8::from(lanes.map(|color| color[c])))
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stacks as they are described, and how they are made from that.
 
 use super::{Layered, LayeredError, Level, Medium, Quantity, Surface};
-use crate::{Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Facets, Ggx, Glass};
+use crate::{Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Facets, Film, Ggx, Glass};
 use crate::{Microsurface, Real, Rgb};
 use smallvec::{SmallVec, smallvec};
 
@@ -298,6 +298,19 @@ fn reflectance<F: Real>(value: Rgb<F>) -> Result<(), LayeredError> {
     })
 }
 
+/// Refuses indices that nothing has.
+fn complex_index<F: Real>(eta: Rgb<F>, k: Rgb<F>) -> Result<(), LayeredError> {
+    for c in 0..3 {
+        let (eta, k) = (eta.0[c], k.0[c]);
+        let something = eta + k > F::zero();
+        for part in [eta, k] {
+            let fits = part >= F::zero() && something;
+            check(None, Quantity::ComplexIndex, part, fits)?;
+        }
+    }
+    Ok(())
+}
+
 /// The reflectance of metal under a medium of index `above`.
 fn under<F: Real>(
     fresnel: ConductorFresnel<F>,
@@ -316,15 +329,23 @@ fn under<F: Real>(
             reflectance(f90)?;
         }
         ConductorFresnel::Complex { eta, k } => {
-            for c in 0..3 {
-                let (eta, k) = (eta.0[c], k.0[c]);
-                let something = eta + k > F::zero();
-                for part in [eta, k] {
-                    let fits = part >= F::zero() && something;
-                    check(None, Quantity::ComplexIndex, part, fits)?;
-                }
-            }
+            complex_index(eta, k)?;
             return Ok(ConductorFresnel::Complex {
+                eta: eta * above.recip(),
+                k: k * above.recip(),
+            });
+        }
+        ConductorFresnel::Film { film, eta, k } => {
+            complex_index(eta, k)?;
+            check(None, Quantity::Ior, film.ior, film.ior > F::zero())?;
+            let thickness = film.thickness;
+            check(None, Quantity::Thickness, thickness, thickness >= F::zero())?;
+            return Ok(ConductorFresnel::Film {
+                // The way through the film keeps its length in wavelengths.
+                film: Film {
+                    ior: film.ior / above,
+                    thickness: thickness * above,
+                },
                 eta: eta * above.recip(),
                 k: k * above.recip(),
             });
