@@ -23,6 +23,7 @@ Conventions
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +32,26 @@ from numpy.typing import ArrayLike, NDArray
 from . import _smithwalk
 
 __version__: str = _smithwalk.__version__
-__all__ = ["Albedo", "Lobe", "Material", "conductor", "dielectric", "diffuse", "spherical"]
+__all__ = [
+    "Albedo",
+    "Interface",
+    "Lobe",
+    "Material",
+    "conductor",
+    "dielectric",
+    "diffuse",
+    "lambert",
+    "layered",
+    "spherical",
+]
 
 Array = NDArray[np.float64]
+
+
+_Triple = tuple[float, float, float]
+_Normals = tuple[str, tuple[float, float], float]
+_Bottom = tuple[str, _Normals, _Triple, _Triple]
+_BLACK: _Triple = (0.0, 0.0, 0.0)
 
 
 class Albedo(NamedTuple):
@@ -76,11 +94,12 @@ def spherical(cos: ArrayLike, phi: ArrayLike = 0.0) -> Array:
 
 
 class Material:
-    """A rough surface, made by `conductor`, `dielectric` or `diffuse`."""
+    """A rough surface, made by `conductor`, `dielectric`, `diffuse`, `lambert` or `layered`."""
 
-    def __init__(self, surface: _smithwalk.Surface, description: str):
+    def __init__(self, surface: _smithwalk.Surface, description: str, bottom: _Bottom | None = None):
         self._surface = surface
         self._description = description
+        self._bottom = bottom
 
     def __repr__(self) -> str:
         return f"smithwalk.{self._description}"
@@ -210,9 +229,10 @@ def conductor(
         if min(eta) <= 0.0:
             raise ValueError("eta: expected numbers above 0")
         surface = _smithwalk.Surface.conductor_complex(normals, eta, k)
-        return Material(surface, f"{shown}, eta={eta}, k={k})")
+        return Material(surface, f"{shown}, eta={eta}, k={k})", ("complex", normals, eta, k))
     color = _channels("color", 1.0 if color is None else color, 0.0, 1.0)
-    return Material(_smithwalk.Surface.conductor_color(normals, color), f"{shown}, color={color})")
+    surface = _smithwalk.Surface.conductor_color(normals, color)
+    return Material(surface, f"{shown}, color={color})", ("color", normals, color, _BLACK))
 
 
 def dielectric(
@@ -249,7 +269,56 @@ def diffuse(
     normals = _normals(distribution, alpha, gamma)
     color = _channels("color", color, 0.0, 1.0)
     surface = _smithwalk.Surface.diffuse(normals, color)
-    return Material(surface, f"diffuse({_shown(distribution, alpha, gamma)}, color={color})")
+    shown = f"diffuse({_shown(distribution, alpha, gamma)}, color={color})"
+    return Material(surface, shown, ("diffuse", normals, color, _BLACK))
+
+
+def lambert(*, color: ArrayLike = 1.0) -> Material:
+    """A smooth diffuse surface of albedo `color`, 0 to 1, one number or three."""
+    color = _channels("color", color, 0.0, 1.0)
+    bottom = ("diffuse", ("ggx", (0.0, 0.0), 2.0), color, _BLACK)
+    return Material(_smithwalk.Surface.layered([], bottom), f"lambert(color={color})", bottom)
+
+
+class Interface(NamedTuple):
+    """A dielectric interface and the slab below it, for `layered`."""
+
+    ior: float
+    """Absolute index of refraction of the medium below."""
+    alpha: float | tuple[float, float] = 0.0
+    """Slope roughness α, one number or (α_x, α_y); 0 is smooth."""
+    distribution: str = "ggx"
+    """'ggx' or 'beckmann'."""
+    absorption: ArrayLike = 0.0
+    """Absorption of the slab per unit of length, one number or three."""
+    thickness: float = 1.0
+    """Thickness of the slab, in that unit."""
+
+
+def layered(interfaces: Sequence[Interface], base: Material | None = None) -> Material:
+    """Interfaces from the top, in air, over a base: light walks among them, all orders at each.
+
+    `base`: a `conductor`, `diffuse` or `lambert` material, or None, where the medium below
+    the last interface goes on. In `eval` and `eval_orders` order 1 is light that met one facet
+    at every surface; what smooth surfaces alone send into a single direction is not part of
+    values, but is of `sample`, `albedo` and `lobe`. 'walk', 'two-walk' and 'position-free' are
+    all the estimator of layers.
+    Source: Guo, Hašan and Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary
+    Layered BSDFs".
+    """
+    if base is not None and base._bottom is None:
+        raise ValueError("base: expected a conductor, diffuse or lambert material, or None")
+    layers = []
+    for interface in interfaces:
+        ior, alpha, distribution, absorption, thickness = Interface(*interface)
+        pair = np.asarray(alpha, float)
+        if pair.shape not in ((), (2,)) or not np.isfinite(pair).all() or not (pair >= 0.0).all():
+            raise ValueError(f"alpha: expected one number from 0 or two, found {alpha!r}")
+        x, y = np.broadcast_to(pair, 2)
+        normals = (distribution, (float(x), float(y)), 2.0)
+        layers.append((float(ior), normals, _channels("absorption", absorption, 0.0, np.inf), float(thickness)))
+    surface = _smithwalk.Surface.layered(layers, None if base is None else base._bottom)
+    return Material(surface, f"layered({list(interfaces)!r}, base={base!r})")
 
 
 def _alpha(distribution: str, alpha: float | tuple[float, float] | None) -> tuple[float, float]:

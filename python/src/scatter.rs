@@ -1,8 +1,9 @@
 //! What is measured: a microsurface of whichever distribution and facets.
 
 use rand_pcg::Pcg64Mcg;
+use smithwalk_model::layered::Layered;
 use smithwalk_model::{
-    Estimator, Exit, Facets, Microsurface, Ndf, PerOrder, Rgb, Stream, Total, Vector3,
+    Estimator, Exit, Facets, Microsurface, Ndf, PerOrder, Rgb, Split, Stream, Total, Vector3,
 };
 
 /// The generator that each point has one of.
@@ -72,6 +73,59 @@ where
     }
 }
 
+/// A stack that is seen from above or, with z turned, from below.
+struct Stack {
+    layers: Layered<f64>,
+    below: bool,
+}
+
+impl Stack {
+    fn upright(&self, v: Vector3<f64>) -> Vector3<f64> {
+        if self.below {
+            Vector3::new(v.x, v.y, -v.z)
+        } else {
+            v
+        }
+    }
+}
+
+impl Scatter for Stack {
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64> {
+        let (wi, wo) = (self.upright(wi), self.upright(wo));
+        let mut split = Split::default();
+        self.layers.eval(wi, wo, rng, &mut split);
+        match method {
+            Method::Single => split.single,
+            Method::Orders(_) => split.total(),
+        }
+    }
+
+    fn eval_orders(
+        &self,
+        _: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    ) {
+        let (wi, wo) = (self.upright(wi), self.upright(wo));
+        self.layers.eval(wi, wo, rng, orders);
+    }
+
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>> {
+        let exit = self.layers.sample(self.upright(wi), rng)?;
+        Some(Exit {
+            direction: self.upright(exit.direction),
+            weight: exit.weight,
+            order: exit.order,
+        })
+    }
+
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
+        self.layers.pdf(self.upright(wi), self.upright(wo))
+    }
+}
+
 /// A surface from its two sides.
 pub struct Sides {
     above: Box<dyn Scatter>,
@@ -91,6 +145,18 @@ impl Sides {
                 let facets = facets.inverted();
                 Box::new(Microsurface { ndf, facets }) as Box<dyn Scatter>
             }),
+        }
+    }
+
+    /// A stack of layers.
+    pub fn layered(layers: Layered<f64>) -> Self {
+        let seen = |below| {
+            let layers = layers.clone();
+            Box::new(Stack { layers, below }) as Box<dyn Scatter>
+        };
+        Self {
+            above: seen(false),
+            below: layers.is_open().then(|| seen(true)),
         }
     }
 

@@ -4,6 +4,7 @@ use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use smithwalk_model::layered::{Base, Finish, Interface, Layered};
 use smithwalk_model::{
     Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Facets, Ggx, Quadratic,
     Rgb, StudentT, Vector3,
@@ -43,6 +44,47 @@ where
         }
     };
     Ok(Surface(sides))
+}
+
+/// An interface: the index below, its normals, and absorption and thickness of
+/// the slab below.
+type Layer = (f64, OwnedNormals, [f64; 3], f64);
+
+/// A base: its facets, its normals, and colour or η and k.
+type Bottom = (String, OwnedNormals, [f64; 3], [f64; 3]);
+
+/// [`Normals`] that lists can hold.
+type OwnedNormals = (String, [f64; 2], f64);
+
+fn finish((distribution, [alpha_x, alpha_y], _): OwnedNormals) -> PyResult<Finish<f64>> {
+    Ok(match distribution.as_str() {
+        "ggx" => Finish::Ggx(Ggx { alpha_x, alpha_y }),
+        "beckmann" => Finish::Beckmann(Beckmann { alpha_x, alpha_y }),
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "distribution: layers have 'ggx' and 'beckmann', found {other:?}"
+            )));
+        }
+    })
+}
+
+fn base(bottom: Option<Bottom>) -> PyResult<Base<f64>> {
+    let Some((facets, normals, first, second)) = bottom else {
+        return Ok(Base::Open);
+    };
+    let finish = finish(normals)?;
+    let fresnel = match facets.as_str() {
+        "diffuse" => {
+            let albedo = Rgb(first);
+            return Ok(Base::Diffuse { finish, albedo });
+        }
+        "color" => ConductorFresnel::Constant(Rgb(first)),
+        _ => ConductorFresnel::Complex {
+            eta: Rgb(first),
+            k: Rgb(second),
+        },
+    };
+    Ok(Base::Conductor { finish, fresnel })
 }
 
 fn method(name: &str) -> PyResult<Method> {
@@ -112,6 +154,23 @@ impl Surface {
     fn diffuse(normals: Normals<'_>, albedo: [f64; 3]) -> PyResult<Self> {
         let albedo = Rgb(albedo);
         with(normals, Diffuse { albedo })
+    }
+
+    #[staticmethod]
+    fn layered(interfaces: Vec<Layer>, bottom: Option<Bottom>) -> PyResult<Self> {
+        let interfaces = interfaces
+            .into_iter()
+            .map(|(ior, normals, absorption, thickness)| {
+                Ok(Interface {
+                    absorption: Rgb(absorption),
+                    thickness,
+                    ..Interface::new(ior, finish(normals)?)
+                })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let layers = Layered::new(&interfaces, base(bottom)?);
+        let layers = layers.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self(Sides::layered(layers)))
     }
 
     fn eval<'py>(

@@ -84,6 +84,38 @@ def test_students_distribution_is_ggx_at_two_and_goes_to_beckmann():
     np.testing.assert_allclose(tails.reflected, 1.0, atol=1e-9)
 
 
+def test_layers_over_lambert_have_their_exact_albedo():
+    """R = F + (1 - F)(1 - Fi) c / (1 - c Fi), Fi = 1 - (1 - Fe)/n², for a smooth interface over albedo c."""
+    n, c, cos = 1.5, np.array([0.8, 0.5, 0.1]), np.array([0.95, 0.5, 0.2])
+
+    def fresnel(cos):
+        t = np.sqrt(1.0 - (1.0 - cos * cos) / n**2)
+        s, p = (cos - n * t) / (cos + n * t), (t - n * cos) / (t + n * cos)
+        return (s * s + p * p) / 2
+
+    mu = (np.arange(100_000) + 0.5) / 100_000
+    inside = 1.0 - (1.0 - (2.0 * mu * fresnel(mu)).mean()) / n**2
+    f = fresnel(cos)[:, None]
+    exact = f + (1.0 - f) * (1.0 - inside) * c / (1.0 - c * inside)
+    paint = smithwalk.layered([smithwalk.Interface(ior=n)], smithwalk.lambert(color=c))
+    found = paint.albedo(cos, samples=200_000)
+    agree(found.reflected, found.reflected_stderr, exact)
+
+    rough = smithwalk.layered(
+        [smithwalk.Interface(ior=1.5, alpha=0.3), smithwalk.Interface(ior=1.2, alpha=(0.1, 0.4), distribution="beckmann")]
+    )
+    through = rough.albedo([0.7, -0.7], samples=20_000)
+    np.testing.assert_allclose(through.reflected + through.transmitted, 1.0, atol=1e-9)
+    wi, wo = smithwalk.spherical(0.6, 0.2), smithwalk.spherical(-0.7, 2.9)
+    down, down_error = rough.eval(wi, wo, samples=40_000)
+    up, up_error = rough.eval(wo, wi, samples=40_000, seed=3)
+    agree(down / 0.7, np.hypot(down_error / 0.7, up_error * 1.44 / 0.6), up / 0.6 * 1.44)
+    with pytest.raises(ValueError, match="base: expected"):
+        smithwalk.layered([smithwalk.Interface(1.5)], rough)
+    with pytest.raises(ValueError, match="distribution: layers"):
+        smithwalk.layered([smithwalk.Interface(1.5, 0.1, "quadratic")])
+
+
 def test_values_integrate_to_albedos():
     gold = smithwalk.conductor(alpha=0.7, color=(1.0, 0.71, 0.29))
     n = 64
