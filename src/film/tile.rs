@@ -446,13 +446,14 @@ impl FilmTile {
                 .copied()
                 .chain(std::iter::repeat(0)),
         );
-        // Means of single-precision numbers are such numbers.
+        // Means of single-precision numbers are such numbers; counts come first, which
+        // means are taken by.
         let mut colors = self.window.pixels().flat_map(|pixel| self.color(pixel));
         halves.iter().all(|half| half.is_finite())
-            && colors.all(|color| (color as f32).is_finite())
             && counts
                 .into_iter()
                 .all(|(&left_out, aovs)| left_out.checked_add(aovs).is_some_and(|sum| sum <= count))
+            && colors.all(|color| (color as f32).is_finite())
     }
 
     pub(super) fn fault(&self, fault: Fault) -> &FaultCount {

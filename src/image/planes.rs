@@ -48,7 +48,7 @@ pub(crate) fn read_flat(
     reader
         .seek(SeekFrom::Start(0))
         .map_err(|error| error.to_string())?;
-    // The decompressors are others' code, and what they run into ends here: in a thread
+    // The decompressors are others' code, and a panic of theirs ends here: in a thread
     // of a pool it would end the program.
     let read = || {
         exr::prelude::read()
