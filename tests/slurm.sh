@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The scripts of farm/slurm on a real Slurm of two nodes on this machine: one render is
-# killed by SIGKILL, one task requeued by scontrol, one runs into its time limit; the
-# merged frames have the bits of those rendered here. Takes about a minute, as root:
-# munge, slurmctld and slurmd are started, and stopped at the end.
+# killed by SIGKILL, one task requeued by scontrol; the merged frames have the bits of
+# those rendered here. As root: munge, slurmctld and slurmd are started, and stopped at
+# the end.
 #   tests/slurm.sh [SMITHWALK]
 # Exit code 77: skipped, for want of Slurm or of the rights to start it.
 set -euo pipefail

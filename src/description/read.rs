@@ -155,6 +155,10 @@ impl Fault {
                 }
                 path.to_vec()
             }
+            // What was cut off is missing for that reason alone.
+            Self::Clash { key, .. } if node.get(&key).is_some_and(|value| value.pruned) => {
+                path.to_vec()
+            }
             Self::Clash { key, message } => {
                 let place = node.key_place(&key).unwrap_or(node.place);
                 sources.report(place, dotted(&child(&key)), message, None);

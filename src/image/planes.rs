@@ -1,8 +1,11 @@
 //! The channels of an OpenEXR file, and which of them are its colour.
 
+use exr::block::chunk::CompressedBlock;
+use exr::compression::Compression;
 use exr::meta::MetaData;
+use exr::meta::header::Header;
 use exr::prelude::{FlatImage, FlatSamples, IntegerBounds, ReadChannels, ReadLayers, Text};
-use std::io::{BufRead, Seek, SeekFrom};
+use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::memory::Bytes;
@@ -45,9 +48,15 @@ pub(crate) fn read_flat(
     if headers.iter().all(|header| header.deep) {
         return Err("it holds deep data alone, which is not read".to_owned());
     }
-    reader
-        .seek(SeekFrom::Start(0))
-        .map_err(|error| error.to_string())?;
+    let start = |reader: &mut dyn Seek| {
+        let at = reader.seek(SeekFrom::Start(0));
+        at.map(|_| ()).map_err(|error| error.to_string())
+    };
+    start(&mut reader)?;
+    if headers.iter().any(is_dwa) {
+        check_dwa(&mut reader)?;
+        start(&mut reader)?;
+    }
     // The decompressors are others' code, and a panic of theirs ends here: in a thread
     // of a pool it would end the program.
     let read = || {
@@ -63,6 +72,45 @@ pub(crate) fn read_flat(
     catch_unwind(AssertUnwindSafe(read))
         .map_err(|_| "it is broken: its decoder gave up".to_owned())?
         .map_err(|error| error.to_string())
+}
+
+fn is_dwa(header: &Header) -> bool {
+    matches!(
+        header.compression,
+        Compression::DWAA(_) | Compression::DWAB(_)
+    )
+}
+
+/// Refuses DWA streams that claim more than their bytes can hold: the decoder takes the
+/// memory that they claim, and an allocation that fails ends the program.
+fn check_dwa(reader: impl Read + Seek) -> Result<(), String> {
+    let text = |error: exr::error::Error| error.to_string();
+    let file = exr::block::read(reader, false).map_err(text)?;
+    let headers = file.headers().to_vec();
+    for chunk in file.all_chunks(false).map_err(text)? {
+        let chunk = chunk.map_err(text)?;
+        let header = &headers[chunk.layer_index];
+        let stream = match &chunk.compressed_block {
+            CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+            CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+            CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => continue,
+        };
+        let pixels = header
+            .get_block_data_indices(&chunk.compressed_block)
+            .and_then(|block| header.get_absolute_block_pixel_coordinates(block))
+            .map_err(text)?;
+        // Blocks that would not shrink are stored as they are.
+        let is_raw = stream.len() >= pixels.size.area() * header.channels.bytes_per_pixel;
+        if !is_dwa(header) || is_raw {
+            continue;
+        }
+        // A version, nine sizes, and a kind of compression, of eight bytes each.
+        let sizes = stream.chunks_exact(8).skip(1).take(9);
+        let number = |size: &[u8]| size.iter().rev().fold(0, |n, &b| n << 8 | u64::from(b));
+        let largest = sizes.map(number).max();
+        is_plausible(largest.unwrap_or(0), stream.len() as u64)?;
+    }
+    Ok(())
 }
 
 /// Whether pixels of so many bytes can come from a file of that length. What is
@@ -189,5 +237,63 @@ pub(crate) fn find_color(planes: &[Plane]) -> Result<Chosen, &'static str> {
             })
         }
         _ => Err("but more than one layer could be meant"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::{
+        AnyChannels, Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage,
+    };
+    use std::io::Cursor;
+
+    fn dwa() -> Vec<u8> {
+        let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
+            let x = (at.0 * 7 % 13) as f32 + at.1 as f32;
+            (x, 0.5 * x, 0.0)
+        });
+        let encoding = Encoding {
+            compression: Compression::DWAA(None),
+            ..Encoding::FAST_LOSSLESS
+        };
+        let layer = Layer::new((64, 64), LayerAttributes::default(), encoding, channels);
+        let mut bytes = Cursor::new(Vec::new());
+        let image: Image<Layer<_>> = Image::from_layer(layer);
+        image.write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    fn read(bytes: &[u8]) -> Result<FlatImage, String> {
+        read_flat(Cursor::new(bytes), bytes.len() as u64, 1 << 30)
+    }
+
+    #[test]
+    fn streams_that_claim_too_much_are_refused() {
+        let sound = dwa();
+        let file: FlatImage = read(&sound).expect("a sound file is read");
+        let _: &AnyChannels<FlatSamples> = &file.layer_data[0].channel_data;
+        // The counters stand at the start of a chunk's stream.
+        let mut chunks = exr::block::read(Cursor::new(&sound), false)
+            .unwrap()
+            .all_chunks(false)
+            .unwrap();
+        let Some(Ok(chunk)) = chunks.next() else {
+            panic!("there are chunks");
+        };
+        let CompressedBlock::Tile(block) = chunk.compressed_block else {
+            panic!("they are tiles");
+        };
+        let stream = block.compressed_pixels_le;
+        let at = sound
+            .windows(stream.len())
+            .position(|bytes| bytes == stream)
+            .expect("the stream is in the file");
+        for counter in 1..10 {
+            let mut broken = sound.clone();
+            broken[at + 8 * counter + 6] = 1;
+            let error = read(&broken).expect_err("2⁴⁸ bytes");
+            assert!(error.contains("can't hold"), "{error}");
+        }
     }
 }
