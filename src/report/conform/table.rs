@@ -145,18 +145,17 @@ pub fn read(file: impl Read) -> Result<Vec<Claim>, TableProblem> {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
-        .from_reader(file);
+        .from_reader(file.chain(&b"\n"[..]));
+    // A record's own position is before the comments above it; the reader stands at the
+    // beginning of the line after.
+    let line_of = |reader: &csv::Reader<_>| reader.position().line() - 1;
     let broken = |error: csv::Error| TableProblem {
         line: error.position().map_or(1, csv::Position::line),
         message: error.to_string(),
     };
-    let header: Vec<String> = reader
-        .headers()
-        .map_err(broken)?
-        .iter()
-        .map(str::to_owned)
-        .collect();
-    let line = reader.position().line();
+    let header = reader.headers().map_err(broken)?;
+    let header: Vec<String> = header.iter().map(str::to_owned).collect();
+    let line = line_of(&reader);
     for (index, name) in header.iter().enumerate() {
         let message = if header[..index].contains(name) {
             format!("the column `{}` is there twice", excerpt(name))
@@ -174,9 +173,9 @@ pub fn read(file: impl Read) -> Result<Vec<Claim>, TableProblem> {
         return Err(TableProblem { line, message });
     }
     let mut claims = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(broken)?;
-        let line = record.position().map_or(0, csv::Position::line);
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(broken)? {
+        let line = line_of(&reader);
         let cells = header.iter().map(String::as_str).zip(record.iter());
         let row = Row(cells.filter(|(_, text)| !text.is_empty()).collect());
         let claim = row.claim(line);
