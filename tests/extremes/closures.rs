@@ -324,7 +324,9 @@ fn albedo(subject: &Subject, cos: f64, seed: u64, count: u32) -> Mean {
     let diffuse = matches!(
         subject.closure,
         Closure::Rough(
-            RoughClosure::Ggx(ByFacets::Diffuse(_)) | RoughClosure::Beckmann(ByFacets::Diffuse(_))
+            RoughClosure::Ggx(ByFacets::Diffuse(_))
+                | RoughClosure::Beckmann(ByFacets::Diffuse(_))
+                | RoughClosure::Quadratic(ByFacets::Diffuse(_))
         )
     );
     let light = |wi: Vec3| {
