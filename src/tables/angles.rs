@@ -30,7 +30,7 @@ pub struct AngleTable {
     pub theta_o: Vec<f64>,
     /// Radians.
     pub phi: Vec<f64>,
-    /// [θ_i][θ_o][φ], φ running fastest.
+    /// `[θ_i][θ_o][φ]`, φ running fastest.
     pub values: Vec<Estimate>,
 }
 
