@@ -138,7 +138,7 @@ fn image_of(path: &Path, overrides: &[(&str, &str)], spp: u32) -> Vec<[f32; 3]> 
 /// samples have a standard error of .1 %, so that 1 % is far from chance. Takes minutes:
 /// `cargo test --release --test suite -- leadr --ignored`.
 #[test]
-#[ignore]
+#[ignore = "takes minutes, and fails: means agree within a tenth only so far"]
 fn a_normal_map_from_afar_shines_as_from_near_and_as_the_shape_itself() {
     let folder = folder("leadr");
     write(&folder, &Waves::new(0.12));
