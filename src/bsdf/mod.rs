@@ -52,7 +52,7 @@ pub use mixture::{Bsdf, InLanes, MAX_CLOSURES, ScatterSample, WeightedClosure};
 pub use rise::Rises;
 pub use rough::{Method, Rough};
 pub use sheen::Sheen;
-pub use stack::Stack;
+pub use stack::{Stack, StackLayers};
 pub use table::{ByFacets, Distribution, FacetKind, Listed, RoughClosure, Width, WidthInLanes};
 
 use glam::Vec3;

@@ -1,6 +1,6 @@
 //! Layered surfaces behind the closure contract.
 
-use std::borrow::Cow;
+use std::ops::Deref;
 
 use glam::Vec3;
 
@@ -12,16 +12,37 @@ use smithwalk_model::{Draw, Tally, Vector3};
 /// A stack of interfaces, by the side that it is seen from. All orders, by walks.
 #[derive(Clone, Debug)]
 pub struct Stack {
-    layers: Cow<'static, Layered<f32>>,
+    layers: StackLayers,
     /// The stack's frame is this one, point-reflected.
     inverted: bool,
+}
+
+/// Where a stack's layers are kept: apart, since every closure at a hit has the size of
+/// the largest.
+#[derive(Clone, Debug)]
+pub enum StackLayers {
+    /// With the material, which is everywhere the same.
+    Fixed(&'static Layered<f32>),
+    /// Made for this hit.
+    Made(Box<Layered<f32>>),
+}
+
+impl Deref for StackLayers {
+    type Target = Layered<f32>;
+
+    fn deref(&self) -> &Layered<f32> {
+        match self {
+            Self::Fixed(layers) => layers,
+            Self::Made(layers) => layers,
+        }
+    }
 }
 
 impl Stack {
     /// A stack seen from outside (`front`) or from inside. Behind an opaque base is
     /// what is before it, as it is with closures of one surface.
     #[must_use]
-    pub fn new(layers: Cow<'static, Layered<f32>>, front: bool) -> Self {
+    pub fn new(layers: StackLayers, front: bool) -> Self {
         Self {
             inverted: !front && layers.is_open(),
             layers,

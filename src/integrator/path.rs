@@ -25,7 +25,7 @@ use crate::features::{Features, has};
 use crate::integrator::split::{Split, Spread};
 use crate::rays::RayKind;
 use crate::sampler::{Dimension, Purpose, Sampler};
-use crate::scene::Surface;
+use crate::scene::{Surface, View};
 
 use lanes::WORTH_LANES;
 use mean::Mean;
@@ -47,7 +47,8 @@ impl<const F: u32> PathTracer<'_, F> {
         let Some(surface) = self.next_surface(&mut trunk, &mut found) else {
             return PathResult::of(found);
         };
-        let bsdf = self.scene.bsdf::<F>(&surface, trunk.view());
+        let mut bsdf = Bsdf::<F>::new(surface.geometric_normal);
+        self.scene.add_closures(&mut bsdf, &surface, trunk.view());
         let most = split.light_samples.len().max(split.branches.len());
         let lanes = (most >= WORTH_LANES).then(|| bsdf.in_lanes()).flatten();
         let lanes_for = |samples: &Range<u32>| {
@@ -103,19 +104,20 @@ impl<const F: u32> PathTracer<'_, F> {
             sampler.set_index(index);
             let mut branch = trunk.clone();
             if self.scatter(&mut branch, surface, bsdf, sampler) {
-                mean.add(self.follow(branch, sampler));
+                mean.add(self.follow(&mut branch, sampler));
             }
         }
         mean.finish()
     }
 
     /// Follows a scattered path to its end.
-    fn follow(&self, mut path: Path, sampler: &mut Sampler) -> Found {
+    fn follow(&self, path: &mut Path, sampler: &mut Sampler) -> Found {
         let mut found = Found::default();
-        while let Some(surface) = self.next_surface(&mut path, &mut found) {
-            let bsdf = self.scene.bsdf::<F>(&surface, path.view());
-            self.light_sample(&path, &surface, &bsdf, sampler, &mut found);
-            if !self.scatter(&mut path, &surface, &bsdf, sampler) {
+        while let Some(surface) = self.next_surface(path, &mut found) {
+            let mut bsdf = Bsdf::<F>::new(surface.geometric_normal);
+            self.scene.add_closures(&mut bsdf, &surface, path.view());
+            self.light_sample(path, &surface, &bsdf, sampler, &mut found);
+            if !self.scatter(path, &surface, &bsdf, sampler) {
                 break;
             }
         }
@@ -166,13 +168,20 @@ impl<const F: u32> PathTracer<'_, F> {
             if !has::<F>(Features::TRANSPARENCY) || path.vertex >= MAX_STRAIGHT {
                 return None;
             }
-            path.throughput *= self.scene.bsdf::<F>(&surface, path.view()).transparency();
+            path.throughput *= self.transparency(&surface, path.view());
             if path.throughput == Rgb::ZERO {
                 return None;
             }
             self.cross(path, &surface);
             path.pass_through(&surface);
         }
+    }
+
+    /// The share of light that a surface lets straight through, per channel.
+    fn transparency(&self, surface: &Surface, view: View) -> Rgb {
+        let mut bsdf = Bsdf::<F>::new(surface.geometric_normal);
+        self.scene.add_closures(&mut bsdf, surface, view);
+        bsdf.transparency()
     }
 
     /// Keeps what the path is inside of when it goes through a surface.

@@ -302,11 +302,11 @@ impl Scene {
         self.materials[surface.material].normal(&point, surface)
     }
 
-    /// The closures at a surface point for who looks at it, for the features `F`.
-    #[must_use]
+    /// Adds the closures at a surface point for who looks at it, for the features `F`.
     #[inline]
-    pub fn bsdf<const F: u32>(&self, surface: &Surface, view: View) -> Bsdf<F> {
-        self.materials[surface.material].bsdf(self.ground(surface.object), surface, view)
+    pub fn add_closures<const F: u32>(&self, bsdf: &mut Bsdf<F>, surface: &Surface, view: View) {
+        let material = &self.materials[surface.material];
+        material.add_closures(bsdf, self.ground(surface.object), surface, view);
     }
 
     /// The radiance (W·m⁻²·sr⁻¹) of a point of an emissive triangle towards `wo`,

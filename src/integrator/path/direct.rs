@@ -163,7 +163,7 @@ impl<const F: u32> PathTracer<'_, F> {
             wo: -ray.direction,
             camera: false,
         };
-        *radiance *= self.scene.bsdf::<F>(&blocker, view).transparency();
+        *radiance *= self.transparency(&blocker, view);
         if radiance.max_element() <= 0.0 {
             return None;
         }

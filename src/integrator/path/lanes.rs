@@ -91,7 +91,7 @@ impl<const F: u32> PathTracer<'_, F> {
                     self.go_on(&mut branch, surface, sampler, sample, Some(pdf))
                 });
                 if goes_on {
-                    mean.add(self.follow(branch, sampler));
+                    mean.add(self.follow(&mut branch, sampler));
                 }
             }
         }

@@ -1,11 +1,9 @@
 //! Stacks of interfaces before their parameters are looked up.
 
-use std::borrow::Cow;
-
 use super::super::Surface;
 use super::rough::{LEAST_IOR, Reflectance, Roughness, Tangent, to_model_color};
 use super::value::{Number, Point, Tint};
-use crate::bsdf::{Closure, Distribution, Frame, Stack};
+use crate::bsdf::{Closure, Distribution, Frame, Stack, StackLayers};
 use crate::color::Rgb;
 use crate::features::Features;
 use smithwalk_model::layered::{Base, Finish, Interface, Layered, LayeredError};
@@ -104,9 +102,9 @@ impl LayeredMaterial {
         surface: &Surface,
     ) -> Option<(Closure, Frame)> {
         let stack = match self.fixed {
-            Some(stack) => Cow::Borrowed(stack),
+            Some(stack) => StackLayers::Fixed(stack),
             // Textures are clamped to what stacks can be made with.
-            None => Cow::Owned(self.layers.at::<F>(point).ok()?),
+            None => StackLayers::Made(Box::new(self.layers.at::<F>(point).ok()?)),
         };
         let frame = self.tangent.frame::<F>(self.rotation, point, surface);
         Some((Closure::Layered(Stack::new(stack, point.front)), frame))

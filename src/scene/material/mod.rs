@@ -97,9 +97,21 @@ pub struct Material {
 impl Material {
     /// The closures at a point, weighted for who looks at it.
     #[must_use]
-    #[inline]
     pub fn bsdf<const F: u32>(&self, ground: Ground<'_>, surface: &Surface, view: View) -> Bsdf<F> {
         let mut bsdf = Bsdf::new(surface.geometric_normal);
+        self.add_closures(&mut bsdf, ground, surface, view);
+        bsdf
+    }
+
+    /// Adds the closures at a point, weighted for who looks at it. Returning them costs
+    /// a copy of two kilobytes.
+    pub fn add_closures<const F: u32>(
+        &self,
+        bsdf: &mut Bsdf<F>,
+        ground: Ground<'_>,
+        surface: &Surface,
+        view: View,
+    ) {
         let most = if has::<F>(Features::MIXES) {
             MAX_CLOSURES
         } else {
@@ -163,15 +175,15 @@ impl Material {
                     }
                 }
                 Leaf::Principled3(node) if has::<F>(Features::PRINCIPLED) => {
-                    node.add(&mut bsdf, &layered(), surface, share);
+                    node.add(bsdf, &layered(), surface, share);
                     continue;
                 }
                 Leaf::Principled4(node) if has::<F>(Features::PRINCIPLED) => {
-                    node.add(&mut bsdf, &layered(), surface, share);
+                    node.add(bsdf, &layered(), surface, share);
                     continue;
                 }
                 Leaf::OpenPbr(node) if has::<F>(Features::PRINCIPLED) => {
-                    node.add(&mut bsdf, &point, surface, share);
+                    node.add(bsdf, &point, surface, share);
                     continue;
                 }
                 leaf if has::<F>(Features::DIFFUSERS) => {
@@ -189,7 +201,6 @@ impl Material {
                 closure,
             });
         }
-        bsdf
     }
 
     /// The closures of a horizontal surface whose tangent is along x, seen from

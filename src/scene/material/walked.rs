@@ -1,13 +1,12 @@
 //! Layers as they are: a coat over metal, glass and plastic, side by side.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::super::Surface;
 use super::layers::finish;
 use super::principled::{LEAST_CHANCE, NONE};
 use super::rough::to_model_color;
-use crate::bsdf::{Bsdf, Closure, Distribution, Frame, Stack, WeightedClosure};
+use crate::bsdf::{Bsdf, Closure, Distribution, Frame, Stack, StackLayers, WeightedClosure};
 use crate::color::Rgb;
 use smithwalk_model::ConductorFresnel;
 use smithwalk_model::layered::{Base, Finish, Interface, Layered};
@@ -73,9 +72,9 @@ impl Walked {
             let stack = match fixed {
                 Some(fixed) => {
                     let number = kind as usize + if coated { 3 } else { 0 };
-                    Cow::Borrowed(fixed[number].get_or_init(make))
+                    StackLayers::Fixed(fixed[number].get_or_init(make))
                 }
-                None => Cow::Owned(make()),
+                None => StackLayers::Made(Box::new(make())),
             };
             Closure::Layered(Stack::new(stack, front))
         };
