@@ -96,11 +96,6 @@ impl ExactSums {
         units as f64 * 2f64.powi(exponent)
     }
 
-    /// Number of sums.
-    pub fn len(&self) -> usize {
-        self.bins.len()
-    }
-
     /// Bytes on the heap.
     pub fn bytes(&self) -> usize {
         self.bins.len() * (size_of::<i8>() + 2 * size_of::<i64>())
@@ -114,12 +109,14 @@ impl ExactSums {
         }
     }
 
-    /// Takes `count` sums from the front of `bytes`; `None` when they are too few or
-    /// say what no sum of at most 2²⁴ terms can.
-    pub fn read(bytes: &mut &[u8], count: usize) -> Option<Self> {
-        let (bins, rest) = bytes.split_at_checked(count)?;
-        let (values, rest) = rest.split_at_checked(count.checked_mul(16)?)?;
-        *bytes = rest;
+    /// What [`Self::write`] has written, [`Self::bytes`] long; `None` when it is of
+    /// another length or says what no sum of at most 2²⁴ terms can.
+    pub fn read(bytes: &[u8]) -> Option<Self> {
+        let count = bytes.len() / (size_of::<i8>() + 2 * size_of::<i64>());
+        let (bins, values) = bytes.split_at(count);
+        if values.len() != count * 2 * size_of::<i64>() {
+            return None;
+        }
         let bins: Vec<i8> = bins.iter().map(|&bin| bin as i8).collect();
         let mut values = values
             .chunks_exact(8)
@@ -243,12 +240,12 @@ mod tests {
         sums.add(2, -1e-9);
         let mut bytes = Vec::new();
         sums.write(&mut bytes);
-        assert_eq!(ExactSums::read(&mut &bytes[..], 3), Some(sums));
-        assert_eq!(ExactSums::read(&mut &bytes[..bytes.len() - 1], 3), None);
+        assert_eq!(ExactSums::read(&bytes), Some(sums));
+        assert_eq!(ExactSums::read(&bytes[..bytes.len() - 1]), None);
         for (position, value) in [(0, 100), (1, 0x80_u8.wrapping_add(1)), (10, 0x7f)] {
             let mut bytes = bytes.clone();
             bytes[position] = value;
-            assert_eq!(ExactSums::read(&mut &bytes[..], 3), None, "{position}");
+            assert_eq!(ExactSums::read(&bytes), None, "{position}");
         }
     }
 }

@@ -7,18 +7,22 @@
 //! count, a u32 number of pixels and 2 × u32 each); last the XXH3 of all that (u128).
 
 use std::collections::BTreeMap;
-use std::ops::Range;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::xxh3_128;
+use xxhash_rust::xxh3::Xxh3Default;
 
 use super::exact::ExactSums;
 use super::tile::{FAULT_PIXELS, FilmTile};
 use super::{Aov, AovSet, Film, Taken};
-use crate::image::{OutputError, Window, replace};
+use crate::image::{OutputError, Window, replace_with};
 
 const MAGIC: &[u8; 16] = b"smithwalk film\0\x06";
+
+/// About as many bytes are written to a file at once.
+const AT_ONCE: usize = 1 << 20;
 
 /// Longer headers are refused: a scene of 10⁶ objects stays below.
 const LONGEST_HEADER: usize = 1 << 28;
@@ -161,15 +165,26 @@ impl Film {
             share: [self.share.start, self.share.end],
         };
         let header = serde_json::to_vec(&header).expect("strings and numbers alone");
-        let mut bytes = Vec::with_capacity(self.bytes() + header.len() + 4096);
-        bytes.extend_from_slice(MAGIC);
+        let mut bytes = MAGIC.to_vec();
         bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
         bytes.extend_from_slice(&header);
-        for tile in &self.tiles {
-            write_tile(tile, &mut bytes);
-        }
-        bytes.extend_from_slice(&xxh3_128(&bytes).to_le_bytes());
-        replace(path, &bytes)
+        replace_with(path, |file| {
+            let mut hash = Xxh3Default::new();
+            let mut write = |bytes: &[u8]| {
+                hash.update(bytes);
+                file.write_all(bytes)
+            };
+            // All at once would be as much again as the film.
+            for tile in &self.tiles {
+                if bytes.len() >= AT_ONCE {
+                    write(&bytes)?;
+                    bytes.clear();
+                }
+                write_tile(tile, &mut bytes);
+            }
+            write(&bytes)?;
+            file.write_all(&hash.digest128().to_le_bytes())
+        })
     }
 
     /// Goes on with a saved film, which must be of the same layout and identity.
@@ -224,21 +239,33 @@ impl SavedFilm {
         if !std::fs::metadata(path).map_err(io)?.is_file() {
             return Err(format("it is no regular file"));
         }
-        let bytes = std::fs::read(path).map_err(io)?;
-        let Some(content) = bytes.strip_prefix(MAGIC) else {
-            let same = bytes.starts_with(&MAGIC[..15]);
+        let mut file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut magic = [0; MAGIC.len()];
+        if length < magic.len() as u64 {
+            return Err(format("it begins differently"));
+        }
+        file.read_exact(&mut magic).map_err(io)?;
+        if magic != *MAGIC {
+            let same = magic.starts_with(&MAGIC[..15]);
             return Err(format(match same {
                 true => "it is of another version",
                 false => "it begins differently",
             }));
-        };
+        }
         let damaged = || format("it is cut off or damaged");
-        let (content, sum) = content.split_last_chunk::<16>().ok_or_else(damaged)?;
-        if u128::from_le_bytes(*sum) != xxh3_128(&bytes[..bytes.len() - 16]) {
+        let overhead = (magic.len() + size_of::<u128>()) as u64;
+        let mut reader = Reader {
+            left: length.checked_sub(overhead).ok_or_else(damaged)?,
+            file: BufReader::with_capacity(AT_ONCE, file),
+            hash: Xxh3Default::new(),
+        };
+        reader.hash.update(&magic);
+        let read = read(&mut reader);
+        if !reader.finish().map_err(io)? {
             return Err(damaged());
         }
-        let (header, film) =
-            read(content).ok_or_else(|| format("its content contradicts itself"))?;
+        let (header, film) = read.ok_or_else(|| format("its content contradicts itself"))?;
         Ok(Self {
             path: path.to_owned(),
             header,
@@ -270,15 +297,12 @@ fn write_tile(tile: &FilmTile, bytes: &mut Vec<u8>) {
 }
 
 /// All between the magic bytes and the hash; `None` when it can't be a film's.
-fn read(content: &[u8]) -> Option<(Header, Film)> {
-    let mut reader = Reader(content);
+fn read(reader: &mut Reader) -> Option<(Header, Film)> {
     let length = reader.u32()? as usize;
     if length > LONGEST_HEADER {
         return None;
     }
-    let (header, rest) = reader.0.split_at_checked(length)?;
-    reader.0 = rest;
-    let header: Header = serde_json::from_slice(header).ok()?;
+    let header: Header = serde_json::from_slice(&reader.bytes(length)?).ok()?;
     let [x, y, width, height] = header.window;
     let window = Window {
         x,
@@ -291,8 +315,7 @@ fn read(content: &[u8]) -> Option<(Header, Film)> {
     // Each pixel takes more than a hundred bytes: what is too large is not allocated.
     let area = u64::from(width) * u64::from(height);
     let [first, end] = header.share;
-    if !fits(x, width, columns) || !fits(y, height, rows) || area > rest.len() as u64 || first > end
-    {
+    if !fits(x, width, columns) || !fits(y, height, rows) || area > reader.left || first > end {
         return None;
     }
     let aovs: AovSet = header.aovs.iter().copied().collect();
@@ -301,38 +324,85 @@ fn read(content: &[u8]) -> Option<(Header, Film)> {
     for tile in &mut film.tiles {
         reader.tile(tile)?;
     }
-    reader.0.is_empty().then_some((header, film))
+    (reader.left == 0).then_some((header, film))
 }
 
-/// The part of a saved film that is yet to be read.
-struct Reader<'a>(&'a [u8]);
+/// A saved film as it is read: whole in memory it would be as much again as the film.
+struct Reader {
+    file: BufReader<File>,
+    /// Bytes that are yet to be read before the hash.
+    left: u64,
+    /// Of what has been read.
+    hash: Xxh3Default,
+}
 
-impl Reader<'_> {
+impl Reader {
+    /// `None` past the end, or where the system refuses, which [`Self::finish`] then
+    /// meets again.
+    fn fill(&mut self, bytes: &mut [u8]) -> Option<()> {
+        self.left = self.left.checked_sub(bytes.len() as u64)?;
+        self.file.read_exact(bytes).ok()?;
+        self.hash.update(bytes);
+        Some(())
+    }
+
+    fn bytes(&mut self, count: usize) -> Option<Vec<u8>> {
+        if count as u64 > self.left {
+            return None;
+        }
+        let mut bytes = vec![0; count];
+        self.fill(&mut bytes)?;
+        Some(bytes)
+    }
+
+    /// Reads on to the end; whether the hash is that of all before it.
+    fn finish(mut self) -> std::io::Result<bool> {
+        let mut rest = [0; 4096];
+        while self.left > 0 {
+            let count = rest.len().min(self.left as usize);
+            self.file.read_exact(&mut rest[..count])?;
+            self.hash.update(&rest[..count]);
+            self.left -= count as u64;
+        }
+        let mut sum = [0; size_of::<u128>()];
+        self.file.read_exact(&mut sum)?;
+        Ok(u128::from_le_bytes(sum) == self.hash.digest128())
+    }
+
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk::<N>()?;
-        self.0 = rest;
-        Some(*taken)
+        let mut taken = [0; N];
+        self.fill(&mut taken)?;
+        Some(taken)
     }
 
     fn u32(&mut self) -> Option<u32> {
         self.take().map(u32::from_le_bytes)
     }
 
+    /// So many numbers of 32 bits.
+    fn words(&mut self, count: usize) -> Option<Vec<u32>> {
+        let bytes = self.bytes(count.checked_mul(size_of::<u32>())?)?;
+        let words = bytes.chunks_exact(size_of::<u32>());
+        let word = |word: &[u8]| u32::from_le_bytes(word.try_into().expect("four bytes"));
+        Some(words.map(word).collect())
+    }
+
     fn tile(&mut self, tile: &mut FilmTile) -> Option<()> {
         let ranges = self.u32()? as usize;
-        if ranges > self.0.len() / 8 {
+        if ranges as u64 > self.left / 8 {
             return None;
         }
-        let range =
-            |reader: &mut Self| -> Option<Range<u32>> { Some(reader.u32()?..reader.u32()?) };
-        let ranges: Option<Vec<_>> = (0..ranges).map(|_| range(self)).collect();
-        tile.taken = Taken::new(ranges?)?;
-        tile.sums = ExactSums::read(&mut self.0, tile.sums.len())?;
-        for value in tile.halves.as_flattened_mut().as_flattened_mut() {
-            *value = f32::from_le_bytes(self.take()?);
+        let ends = self.words(2 * ranges)?;
+        let ranges = ends.chunks_exact(2).map(|ends| ends[0]..ends[1]);
+        tile.taken = Taken::new(ranges.collect())?;
+        tile.sums = ExactSums::read(&self.bytes(tile.sums.bytes())?)?;
+        let halves = tile.halves.as_flattened_mut().as_flattened_mut();
+        let saved = self.words(halves.len())?;
+        for (value, word) in halves.iter_mut().zip(saved) {
+            *value = f32::from_bits(word);
         }
-        for value in tile.left_out.iter_mut().chain(&mut tile.aovs_left_out) {
-            *value = self.u32()?;
+        for counts in [&mut tile.left_out, &mut tile.aovs_left_out] {
+            *counts = self.words(counts.len())?;
         }
         for fault in &mut tile.faults {
             fault.samples = u64::from_le_bytes(self.take()?);
@@ -340,9 +410,8 @@ impl Reader<'_> {
             if pixels > FAULT_PIXELS {
                 return None;
             }
-            for _ in 0..pixels {
-                fault.pixels.push([self.u32()?, self.u32()?]);
-            }
+            let places = self.words(2 * pixels)?;
+            fault.pixels = places.chunks_exact(2).map(|at| [at[0], at[1]]).collect();
         }
         tile.is_possible().then_some(())
     }

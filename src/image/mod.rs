@@ -14,7 +14,7 @@ pub use denoise::DENOISED;
 pub use display::Display;
 pub use exr::{ExrError, read_exr};
 pub use lut::{Log2, Lut, LutError};
-pub use output::{OutputError, OutputPath, check_output, encode_png, replace};
+pub use output::{OutputError, OutputPath, check_output, encode_png, replace, replace_with};
 pub use window::Window;
 
 /// An image with its layers, as developed from a film or read from a file.

@@ -192,6 +192,17 @@ pub fn check_output(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// When the system refuses; a file that was there before stays.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    replace_with(path, |file| file.write_all(bytes))
+}
+
+/// As [`replace`], with what `write` writes, which need not be in memory at once.
+///
+/// # Errors
+/// When the system refuses; a file that was there before stays.
+pub fn replace_with(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> Result<(), OutputError> {
     let failed = |error: std::io::Error| OutputError::Write {
         path: path.to_owned(),
         reason: error.to_string(),
@@ -200,14 +211,12 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         Place::File(target) => target,
         Place::Stream(stream) => {
             let file = File::options().write(true).open(stream);
-            return file
-                .and_then(|mut file| file.write_all(bytes))
-                .map_err(failed);
+            return file.and_then(|mut file| write(&mut file)).map_err(failed);
         }
     };
     let temporary = temporary(&target);
     let written = create_new(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
+        write(&mut file)?;
         file.sync_all()
     });
     if let Err(error) = written {

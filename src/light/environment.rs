@@ -204,7 +204,11 @@ impl Environment {
         let (x, y) = (column - 0.5, row - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
-        let wrap = |x: i64| x.rem_euclid(self.width as i64) as usize;
+        // A division of whole numbers takes as long as all the rest.
+        let wrap = |x: i64| match usize::try_from(x) {
+            Ok(x) if x < self.width => x,
+            _ => x.rem_euclid(self.width as i64) as usize,
+        };
         let clamp = |y: i64| y.clamp(0, self.height as i64 - 1) as usize;
         let (left, right) = (wrap(x0 as i64), wrap(x0 as i64 + 1));
         let (upper, lower) = (clamp(y0 as i64), clamp(y0 as i64 + 1));

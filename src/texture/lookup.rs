@@ -136,8 +136,9 @@ impl Extension {
     pub(super) fn pixel(self, index: i64, count: usize) -> Option<usize> {
         let count = count as i64;
         let pixel = match self {
+            // Divisions of whole numbers are slow, and few places need one.
+            _ if (0..count).contains(&index) => index,
             Self::Repeat => index.rem_euclid(count),
-            Self::Clip if (0..count).contains(&index) => index,
             Self::Clip => return None,
             Self::Extend => index.clamp(0, count - 1),
             Self::Mirror => {

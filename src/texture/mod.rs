@@ -301,48 +301,66 @@ impl Image {
 
     /// Red, green, blue and alpha as stored, `y` from the bottom; with `multiply` the
     /// first three times the last, in whole numbers where pixels are, as in Cycles.
+    #[inline]
     fn texel(&self, x: usize, y: usize, multiply: bool) -> [f32; 4] {
-        let pixel = ((self.height - 1 - y) * self.width + x) * self.channels;
-        let has_alpha = matches!(self.channels, 2 | 4);
-        let last = pixel + self.channels - 1;
-        let whole = |value: u32, alpha: u32, most: u32| {
-            let value = if multiply && has_alpha {
-                value * alpha / most
-            } else {
-                value
-            };
-            value as f32 / most as f32
-        };
-        let real = |value: f32, alpha: f32| {
-            if multiply && has_alpha {
-                value * alpha
-            } else {
-                value
-            }
-        };
-        let color = |channel: usize| {
-            let index = pixel + channel;
-            match &self.texels {
-                Texels::U8(texels) => whole(texels[index].into(), texels[last].into(), 255),
-                Texels::U16(texels) => whole(texels[index].into(), texels[last].into(), 65535),
-                Texels::F16(texels) => real(texels[index].to_f32(), texels[last].to_f32()),
-                Texels::F32(texels) => real(texels[index], texels[last]),
-            }
-        };
-        let alpha = || match &self.texels {
-            Texels::U8(texels) => f32::from(texels[last]) / 255.0,
-            Texels::U16(texels) => f32::from(texels[last]) / 65535.0,
-            Texels::F16(texels) => texels[last].to_f32(),
-            Texels::F32(texels) => texels[last],
-        };
-        match self.channels {
-            1 | 2 => {
-                let grey = color(0);
-                [grey, grey, grey, if has_alpha { alpha() } else { 1.0 }]
-            }
-            3 => [color(0), color(1), color(2), 1.0],
-            _ => [color(0), color(1), color(2), alpha()],
+        let first = ((self.height - 1 - y) * self.width + x) * self.channels;
+        let pixel = first..first + self.channels;
+        let whole = |value: u32, alpha: u32, most: u32| (value * alpha / most) as f32 / most as f32;
+        match &self.texels {
+            Texels::U8(texels) => spread(
+                &texels[pixel],
+                |value| f32::from(value) / 255.0,
+                multiply.then_some(|value: u8, alpha: u8| whole(value.into(), alpha.into(), 255)),
+            ),
+            Texels::U16(texels) => spread(
+                &texels[pixel],
+                |value| f32::from(value) / 65535.0,
+                multiply
+                    .then_some(|value: u16, alpha: u16| whole(value.into(), alpha.into(), 65535)),
+            ),
+            Texels::F16(texels) => spread(
+                &texels[pixel],
+                f16::to_f32,
+                multiply.then_some(|value: f16, alpha: f16| value.to_f32() * alpha.to_f32()),
+            ),
+            Texels::F32(texels) => spread(
+                &texels[pixel],
+                |value| value,
+                multiply.then_some(|value: f32, alpha: f32| value * alpha),
+            ),
         }
+    }
+}
+
+/// Red, green, blue and alpha of a pixel of one to four channels; colours are
+/// multiplied by alpha with `times` where that is given.
+#[inline]
+fn spread<T: Copy>(
+    pixel: &[T],
+    number: impl Fn(T) -> f32,
+    times: Option<impl Fn(T, T) -> f32>,
+) -> [f32; 4] {
+    let color = |value: T, alpha: T| match &times {
+        Some(times) => times(value, alpha),
+        None => number(value),
+    };
+    match *pixel {
+        [grey] => {
+            let grey = number(grey);
+            [grey, grey, grey, 1.0]
+        }
+        [grey, alpha] => {
+            let grey = color(grey, alpha);
+            [grey, grey, grey, number(alpha)]
+        }
+        [r, g, b] => [number(r), number(g), number(b), 1.0],
+        [r, g, b, alpha, ..] => [
+            color(r, alpha),
+            color(g, alpha),
+            color(b, alpha),
+            number(alpha),
+        ],
+        [] => MISSING,
     }
 }
 
