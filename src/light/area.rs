@@ -343,14 +343,56 @@ impl Outline {
 
 /// A rectangle seen from a point, sampled uniformly in solid angle (Ureña,
 /// Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical
-/// Rectangles"; names as there). In f64: at grazing views the arc cosines lose
-/// half of the digits. The squares of an f32 stay within the range of f64.
+/// Rectangles"; names as there). In f64: at grazing views angles that are known by
+/// their cosines lose half of the digits. The squares of an f32 stay within the range of f64.
 struct SphericalRectangle {
     z0: f64,
     b0: f64,
     b1: f64,
-    k: f64,
+    /// e^(i·k); the angle itself would take arc cosines.
+    k: Turn,
     solid_angle: f64,
+}
+
+/// An angle by its cosine and sine.
+#[derive(Clone, Copy)]
+struct Turn {
+    cos: f64,
+    sin: f64,
+}
+
+impl Turn {
+    /// An angle from 0 to π.
+    fn of_cos(cos: f64) -> Self {
+        let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
+        Self { cos, sin }
+    }
+
+    fn of(angle: f64) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        Self { cos, sin }
+    }
+
+    /// The sum of two angles.
+    fn and(self, other: Self) -> Self {
+        Self {
+            cos: self.cos * other.cos - self.sin * other.sin,
+            sin: self.sin * other.cos + self.cos * other.sin,
+        }
+    }
+
+    fn back(self) -> Self {
+        Self {
+            sin: -self.sin,
+            ..self
+        }
+    }
+
+    /// The angle, from 0 to 2π; what rounding leaves of 0 may be less.
+    fn angle(self) -> f64 {
+        let angle = self.sin.atan2(self.cos);
+        if angle < -1e-9 { angle + TAU } else { angle }
+    }
 }
 
 impl SphericalRectangle {
@@ -362,9 +404,10 @@ impl SphericalRectangle {
         // The z of the inward normals of the planes through p and the edges.
         let slope = |a: f64| a / (a * a + z0 * z0).sqrt();
         let normals = [-slope(y[0]), slope(x[1]), slope(y[1]), -slope(x[0])];
-        let angle = |i: usize, j: usize| (-normals[i] * normals[j]).clamp(-1.0, 1.0).acos();
-        let k = TAU - angle(2, 3) - angle(3, 0);
-        let solid_angle = angle(0, 1) + angle(1, 2) - k;
+        let angle = |i: usize, j: usize| Turn::of_cos(-normals[i] * normals[j]);
+        let k = angle(2, 3).and(angle(3, 0)).back();
+        // Girard's theorem; what lies before the plane is less than 2π.
+        let solid_angle = angle(0, 1).and(angle(1, 2)).and(k.back()).angle();
         (solid_angle > LEAST_SOLID_ANGLE).then_some(Self {
             z0,
             b0: normals[0],
@@ -378,8 +421,7 @@ impl SphericalRectangle {
     fn sample(&self, u: [f32; 2], local: Vec3, window: &Window) -> [f32; 2] {
         let local = local.as_dvec3();
         let (x, y) = relative(local, window);
-        let au = f64::from(u[0]) * self.solid_angle + self.k;
-        let (sin, cos) = au.sin_cos();
+        let Turn { cos, sin } = Turn::of(f64::from(u[0]) * self.solid_angle).and(self.k);
         let fu = (cos * self.b0 - self.b1) / sin;
         let cu = (1.0_f64.copysign(fu) / (fu * fu + self.b0 * self.b0).sqrt()).clamp(-1.0, 1.0);
         let xu = -cu * self.z0 / (1.0 - cu * cu).sqrt();
