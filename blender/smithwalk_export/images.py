@@ -3,11 +3,14 @@
 import itertools
 import os
 import shutil
+import tempfile
 
 import bpy
 import numpy as np
 
+from . import exr
 from .meshes import unique_name
+from .nodes import color_space
 
 # What the renderer reads, by the first bytes of the file.
 _SIGNATURES = [
@@ -114,6 +117,8 @@ class ImageWriter:
             self.log.wrong(where, f'image "{image.name}": no such file: {image.filepath_from_user()}')
             return None
 
+        if color_space(image) == "linear":
+            return self._linearise(image, stem, where)
         # The bytes as they are, when the renderer can read them: lossless.
         if not image.is_dirty and image.source == "FILE":
             if image.packed_file:
@@ -138,6 +143,21 @@ class ImageWriter:
         return self._convert(image, stem, where)
 
     def _convert(self, image, stem, where):
+        rgba = self._rgba(image, where)
+        return None if rgba is None else self.save(rgba, stem, image.is_float, where)
+
+    def _linearise(self, image, stem, where):
+        """An image of a colour space that the renderer does not know, as scene-linear EXR."""
+        rgba = self._rgba(image, where)
+        if rgba is None:
+            return None
+        if not image.is_float:  # of floats Blender has converted the values already
+            rgba[..., :3] = scene_linear(rgba[..., :3], image.colorspace_settings.name)
+            if image.alpha_mode in {"STRAIGHT", "PREMUL"}:
+                rgba[..., :3] *= rgba[..., 3:]
+        return self.save(rgba, stem, True, where)
+
+    def _rgba(self, image, where):
         pixels = pixels_of(image)
         if pixels is None:
             self.log.wrong(where, f'image "{image.name}" has no pixels')
@@ -147,7 +167,7 @@ class ImageWriter:
             rgba[..., :3] = pixels
         else:
             rgba[..., :pixels.shape[2]] = pixels
-        return self.save(rgba, stem, image.is_float, where)
+        return rgba
 
     def save(self, rgba, stem, is_float, where):
         """Write an array (bottom row first) as EXR or 8-bit PNG; the file's name, or None."""
@@ -174,3 +194,27 @@ def save_image(path, rgba, is_float):
         image.save()
     finally:
         bpy.data.images.remove(image)
+
+
+def scene_linear(pixels, space):
+    """8-bit values (height, width, 3) of a colour space, by Blender's own colour management."""
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("smithwalk", width, height)
+    scene = bpy.data.scenes.new("smithwalk")
+    try:
+        image.colorspace_settings.name = space
+        rgba = np.ones((height, width, 4), dtype=np.float32)
+        rgba[..., :3] = pixels
+        image.pixels.foreach_set(rgba.ravel())
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+        settings.exr_codec = "ZIP"
+        with tempfile.TemporaryDirectory(prefix="smithwalk-") as folder:
+            path = os.path.join(folder, "linear.exr")
+            image.save_render(path, scene=scene)
+            return exr.read(path)["Combined"][::-1, :, :3]
+    finally:
+        bpy.data.images.remove(image)
+        bpy.data.scenes.remove(scene)

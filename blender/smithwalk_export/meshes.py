@@ -14,10 +14,12 @@ import re
 
 import numpy as np
 
+from . import text
+
 BAKED = "baked"     # the UV map that baked images are on
 FARTHEST = 1e18    # metres: squares of larger coordinates leave single precision
+_FACES = 100_000  # looked at together: bounds the memory
 LEAN = 25.0        # degrees between a corner's normal and its face's, from which Cycles looks otherwise
-_LINES = 100_000  # formatted at a time: bounds the memory of the text
 
 
 def unique_name(name, taken):
@@ -68,7 +70,9 @@ class MeshWriter:
         return signature if digest == entry[1] else digest
 
     def _write(self, ob, uv_maps, colors, baked, needs_uv, transform, progress):
-        mesh = ob.to_mesh()
+        # As in Cycles, the evaluated data itself: a copy, unless the mesh is being edited, costs memory.
+        edited = ob.mode == "EDIT"
+        mesh = ob.to_mesh() if edited else ob.data
         if mesh is None:
             return None
         try:
@@ -76,7 +80,8 @@ class MeshWriter:
                 return None
             arrays = Arrays(mesh, transform, _sides(mesh, uv_maps, colors, baked), needs_uv)
         finally:
-            ob.to_mesh_clear()
+            if edited:
+                ob.to_mesh_clear()
         if arrays.left_out:
             self.log.note(f'object "{ob.name}"', f"{arrays.left_out} face(s) with a vertex that is not "
                                                  "finite, or out of reach, are left out")
@@ -92,14 +97,14 @@ class MeshWriter:
             # Evaluated data has names of its own in some versions.
             name = self._names[same] = unique_name(ob.original.data.name, self.meshes)
             path, file = self.files.new(f"{name}.obj")
-            with open(path, "w", encoding="ascii") as f:
+            with open(path, "wb") as f:
                 arrays.write(f, progress)
             entry = self.meshes[name] = {"file": file}
             for kind, side, values in arrays.sides:
                 beside = file
                 if values is not None:
                     path, beside = self.files.new(f"{name}_{unique_name(side, ())}.obj")
-                    with open(path, "w", encoding="ascii") as f:
+                    with open(path, "wb") as f:
                         arrays.write_side(f, kind, values)
                 entry.setdefault(kind, {})[side] = beside
         return name, arrays.slots
@@ -115,6 +120,29 @@ def _integers(collection, attribute, count):
     values = np.empty(count, dtype=np.int32)
     collection.foreach_get(attribute, values)
     return values
+
+
+def _attribute(mesh, name, usual):
+    """The data of a built-in attribute, which is quicker to read than what mirrors it (`usual`),
+    and the name of its values. There are such attributes from 3.5 on."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        return usual
+    return attribute.data, "vector" if attribute.data_type.startswith("FLOAT") else "value"
+
+
+def _vertex_indices(mesh):
+    data, name = _attribute(mesh, ".corner_vert", (mesh.loops, "vertex_index"))
+    return _integers(data, name, len(mesh.loops))
+
+
+def _active_uvs(mesh):
+    """UVs per corner, or None."""
+    layer = next((l for l in mesh.uv_layers if l.active_render), None)
+    if layer is None or not len(layer.data):
+        return None
+    data, name = _attribute(mesh, layer.name, (layer.data, "uv"))
+    return _floats(data, name, 2, len(mesh.loops))
 
 
 def _sides(mesh, uv_maps, colors, baked):
@@ -140,7 +168,7 @@ def _sides(mesh, uv_maps, colors, baked):
         else:
             values = _floats(layer.data, "color", 4, len(layer.data))[:, :3]
             if layer.domain == "POINT":
-                values = values[_integers(mesh.loops, "vertex_index", count)]
+                values = values[_vertex_indices(mesh)]
         sides.append(("colors", name, _finite(values)))
     return sides
 
@@ -153,7 +181,9 @@ def _corner_normals(mesh):
     count = len(mesh.loops)
     if hasattr(mesh, "calc_normals_split"):  # until 4.0
         mesh.calc_normals_split()
-        return _floats(mesh.loops, "normal", 3, count)
+        normals = _floats(mesh.loops, "normal", 3, count)
+        mesh.free_normals_split()
+        return normals
     return _floats(mesh.corner_normals, "vector", 3, count)
 
 
@@ -168,8 +198,13 @@ def _lean(mesh, normals):
     faces = _floats(mesh.polygons, "normal", 3, count)
     areas = _floats(mesh.polygons, "area", 1, count)[:, 0]
     starts = _integers(mesh.polygons, "loop_start", count)
-    corners = np.repeat(faces, _integers(mesh.polygons, "loop_total", count), axis=0)
-    least = np.minimum.reduceat(np.einsum("ij,ij->i", corners, normals), starts)
+    totals = np.diff(starts, append=len(normals))
+    least = np.empty(count, dtype=np.float32)
+    for first in range(0, count, _FACES):
+        some = slice(first, first + _FACES)
+        begin, end = starts[first], starts[some][-1] + totals[some][-1]
+        cosines = np.einsum("ij,ij->i", np.repeat(faces[some], totals[some], axis=0), normals[begin:end])
+        least[some] = np.minimum.reduceat(cosines, starts[some] - begin)
     least = np.where((areas > 0.0) & np.isfinite(areas), least, 1.0)
     lean = np.degrees(np.arccos(np.clip(least.min(), -1.0, 1.0)))
     leaning = least < np.cos(np.radians(LEAN))
@@ -206,13 +241,16 @@ def _polygons(mesh, loop_count):
     """
     count = len(mesh.polygons)
     starts = _integers(mesh.polygons, "loop_start", count)
-    totals = _integers(mesh.polygons, "loop_total", count)
-    slots = _integers(mesh.polygons, "material_index", count)
-    # Blender clamps the indices of faces whose slot was removed.
-    slots = np.clip(slots, 0, max(len(mesh.materials) - 1, 0))
+    totals = np.diff(starts, append=loop_count)
+    slots = np.zeros(count, dtype=np.int32)
+    if len(mesh.materials) > 1:
+        # Blender clamps the indices of faces whose slot was removed.
+        slots = np.clip(_integers(mesh.polygons, "material_index", count), 0, len(mesh.materials) - 1)
     triangle_count = len(mesh.loop_triangles)
     triangles = _integers(mesh.loop_triangles, "loops", triangle_count * 3).reshape(-1, 3)
-    owner = _integers(mesh.loop_triangles, "polygon_index", triangle_count)
+    polygons = getattr(mesh, "loop_triangle_polygons", None)
+    owner = _integers(polygons, "value", triangle_count) if polygons is not None \
+        else _integers(mesh.loop_triangles, "polygon_index", triangle_count)
     # A quad is a fan from its first corner if its triangles are (0, 1, 2) and
     # (0, 2, 3): the others, (0, 1, 3) and (1, 2, 3), have sums of their own.
     total = triangles.sum(axis=1, dtype=np.int32) - 3 * starts[owner]
@@ -221,7 +259,7 @@ def _polygons(mesh, loop_count):
     broken[owner[is_quad[owner] & (total != 3) & (total != 5)]] = True
     del total
     whole = is_quad & ~broken
-    quads = starts[whole][:, None] + np.arange(4)
+    quads = starts[whole][:, None] + np.arange(4, dtype=np.int32)
     single = ~whole[owner]
     return [(quads, slots[whole]), (triangles[single], slots[owner[single]])]
 
@@ -232,15 +270,15 @@ class Arrays:
     def __init__(self, mesh, transform=None, sides=(), needs_uv=False):
         count = len(mesh.vertices)
         self.sides = sides
-        self.positions = _floats(mesh.vertices, "co", 3, count)
-        layer = next((l for l in mesh.uv_layers if l.active_render), None)
-        uv = _floats(layer.data, "uv", 2, len(mesh.loops)) if layer and len(layer.data) else None
+        data, name = _attribute(mesh, "position", (mesh.vertices, "co"))
+        self.positions = _floats(data, name, 3, count)
+        uv = _active_uvs(mesh)
         if uv is None and needs_uv:
             uv = np.zeros((len(mesh.loops), 2), dtype=np.float32)
         if transform is not None:
             matrix = np.array(transform, dtype=np.float64)
             self.positions = (self.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
-        vertex_of = _integers(mesh.loops, "vertex_index", len(mesh.loops))
+        vertex_of = _vertex_indices(mesh)
         mesh.calc_loop_triangles()
         polygons = _polygons(mesh, len(mesh.loops))
 
@@ -276,23 +314,17 @@ class Arrays:
             keys = np.ascontiguousarray(uv + 0.0).view(np.int64).reshape(-1)
             self.uvs, uv_index = _indexed(keys, uv, vertex_of, count)
 
-        indices = [i for i in (vertex_of, uv_index, normal_index) if i is not None]
+        self._indices = [i for i in (vertex_of, uv_index, normal_index) if i is not None]
         self.slots = sorted(set().union(*(np.unique(s).tolist() for _, s in polygons)))
         self.faces = {slot: [] for slot in self.slots}
-        self._loops = {slot: [] for slot in self.slots if sides}
         self._vertex_of = vertex_of
         for loops, slots in polygons:
             for slot in self.slots:
                 chosen = loops[slots == slot] if len(self.slots) > 1 else loops
                 if len(chosen):
-                    table = np.stack([i[chosen] for i in indices], axis=2).astype(np.int32, copy=False)
-                    table += 1
-                    self.faces[slot].append(table.reshape(len(chosen), -1))
-                    if sides:
-                        self._loops[slot].append(chosen)
-        self._corner = {(True, True): " %d/%d/%d", (True, False): " %d/%d", (False, True): " %d//%d",
-                        (False, False): " %d"}[self.uvs is not None, self.normals is not None]
-        self._width = len(indices)
+                    self.faces[slot].append(chosen)
+        self._separators = [" "] + ["/"] * (self.uvs is not None) \
+            + ["/" if self.uvs is not None else "//"] * (self.normals is not None)
 
     def signature(self):
         """What is the same for equal meshes and quick to find."""
@@ -301,9 +333,9 @@ class Arrays:
 
     def digest(self):
         """A hash of all that the file would hold."""
-        sha = hashlib.sha256((self._corner + str(self.slots)).encode())
-        for array in (self.positions, self.normals, self.uvs, *(t for f in self.faces.values() for t in f),
-                      *(values for _, _, values in self.sides)):
+        sha = hashlib.sha256(("".join(self._separators) + str(self.slots)).encode())
+        for array in (self.positions, self.normals, self.uvs, *self._indices,
+                      *(loops for f in self.faces.values() for loops in f), *(values for _, _, values in self.sides)):
             sha.update(b"" if array is None else np.ascontiguousarray(array))
         return sha.digest()
 
@@ -312,24 +344,26 @@ class Arrays:
         tables = [t for f in self.faces.values() for t in f]
         total = sum(len(r) for r in (self.positions, self.uvs, self.normals, *tables) if r is not None)
         done = 0
-
-        def lines(rows, line):
-            nonlocal done
-            for written in _format(out, rows, line):
-                done += written
-                if progress:
+        for lines in self._sections():
+            for written, rows in lines:
+                out.write(written)
+                done += rows
+                if progress and rows:
                     progress(done / total)
 
-        for rows, line in ((self.positions, "v %.9g %.9g %.9g\n"), (self.uvs, "vt %.9g %.9g\n"),
-                           (self.normals, "vn %de-5 %de-5 %de-5\n")):
-            if rows is not None:
-                lines(rows, line)
+    def _sections(self):
+        yield text.floats("v", self.positions)
+        if self.uvs is not None:
+            yield text.floats("vt", self.uvs)
+        if self.normals is not None:
+            yield text.units("vn", self.normals)
         for slot in self.slots:
-            if len(self.slots) > 1:
-                out.write(f"usemtl slot_{slot}\n")
+            yield self._slot_line(slot)
             for table in self.faces[slot]:
-                lines(table, "f" + self._corner * (table.shape[1] // self._width) + "\n")
+                yield text.corners("f", table, self._indices, self._separators)
 
+    def _slot_line(self, slot):
+        return [(f"usemtl slot_{slot}\n".encode(), 0)] if len(self.slots) > 1 else []
 
     def write_side(self, out, kind, values):
         """The OBJ of the same faces with other UVs, or with colours of vertices."""
@@ -341,30 +375,15 @@ class Arrays:
             _, where, index = np.unique(keys.view(np.dtype((np.void, 16))).reshape(-1),
                                         return_index=True, return_inverse=True)
             vertices = np.hstack([self.positions[self._vertex_of[where]], rows[where]])
-            indices, lines = [index.reshape(-1)], [(vertices, "v" + " %.9g" * 6 + "\n")]
+            indices, sections = [index.reshape(-1)], [text.floats("v", vertices)]
         else:
             keys = rows.view(np.int64).reshape(-1)
             rows, index = _indexed(keys, rows, self._vertex_of, len(self.positions))
             indices = [self._vertex_of, index]
-            lines = [(self.positions, "v %.9g %.9g %.9g\n"), (rows, "vt %.9g %.9g\n")]
-        for table, line in lines:
-            for _ in _format(out, table, line):
-                pass
-        corner = " " + "/".join(["%d"] * len(indices))
+            sections = [text.floats("v", self.positions), text.floats("vt", rows)]
         for slot in self.slots:
-            if len(self.slots) > 1:
-                out.write(f"usemtl slot_{slot}\n")
-            for loops in self._loops[slot]:
-                table = np.stack([i[loops] for i in indices], axis=2) + 1
-                for _ in _format(out, table.reshape(len(loops), -1), "f" + corner * loops.shape[1] + "\n"):
-                    pass
-
-
-def _format(out, rows, line):
-    """Write a line per row, many at a time; yields how many."""
-    for start in range(0, len(rows), _LINES):
-        chunk = rows[start:start + _LINES]
-        if chunk.dtype == np.float32:
-            chunk = chunk + np.float32(0.0)  # −0 to 0
-        out.write(line * len(chunk) % tuple(chunk.ravel().tolist()))
-        yield len(chunk)
+            sections.append(self._slot_line(slot))
+            sections += [text.corners("f", loops, indices, " /"[:len(indices)]) for loops in self.faces[slot]]
+        for lines in sections:
+            for written, _ in lines:
+                out.write(written)

@@ -13,7 +13,23 @@ from mathutils import Euler, Matrix
 from . import fold
 from .fold import NotConstant, luminance
 
-LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Linear BT.709"}
+LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Linear BT.709", "scene_linear"}
+_REC709 = "Linear Rec.709"
+
+
+def working_space():
+    """The space of scene-linear colours: a choice from Blender 5.0 on."""
+    colorspace = getattr(bpy.data, "colorspace", None)
+    return getattr(colorspace, "working_space", _REC709)
+
+
+def color_space(image):
+    """How the renderer is to read an image's values: srgb or non_color; linear where they are
+    converted as they are written, for the renderer knows no other spaces."""
+    name, working = image.colorspace_settings.name, working_space()
+    if name in {"Non-Color", "Raw", "scene_linear", working} or (working == _REC709 and name in LINEAR_SPACES):
+        return "non_color"
+    return "srgb" if name == "sRGB" and working == _REC709 else "linear"
 
 
 @dataclass(frozen=True)
@@ -231,15 +247,15 @@ class Graph:
         if image.source in {"SEQUENCE", "MOVIE"}:
             return Unknown(f'image "{image.name}", a {image.source.lower()} one')
         space = image.colorspace_settings.name
-        if space != "sRGB" and space not in LINEAR_SPACES:
-            return Unknown(f'image "{image.name}" in colour space {space}')
+        if image.source == "TILED" and color_space(image) == "linear":
+            return Unknown(f'image "{image.name}" of tiles in colour space {space}')
         asks_alpha = any(l.is_valid for l in node.outputs["Alpha"].links)
         associated = image.alpha_mode in {"STRAIGHT", "PREMUL"} and space not in {"Non-Color", "Raw"}
         if source.socket.name == "Alpha" and image.alpha_mode == "NONE":
             return 1.0
         texture = Texture(
             image=image,
-            color_space="srgb" if space == "sRGB" else "non_color",
+            color_space=color_space(image),
             interpolation={"Closest": "closest", "Linear": "bilinear"}.get(view.interpolation, "cubic"),
             extension=view.extension.lower(),
             channel="a" if source.socket.name == "Alpha" else None,

@@ -1,6 +1,7 @@
 """The scene's settings: film, sampling, and what the renderer has no setting for."""
 
 from . import view
+from .nodes import working_space
 
 # Settings whose default already is another picture than the renderer's: told
 # once, in short, while they have the default.
@@ -99,6 +100,9 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
     seen = audit.view(scene)
     seen.accept(*_ACCEPTED)
 
+    if working_space() != "Linear Rec.709":
+        log.warn("scene", f"the working space is {working_space()}: images and colours are carried, black bodies, "
+                          "greys of colours and skies are computed as in Rec. 709")
     general = []
     if cycles.sample_clamp_direct or cycles.sample_clamp_indirect:
         values = f"direct {cycles.sample_clamp_direct:g}, indirect {cycles.sample_clamp_indirect:g}"

@@ -90,5 +90,5 @@ def section(nodes, files):
     with open(path, "w", encoding="ascii") as f:
         f.write(f"# Display colours of scene-linear light: log2(x + {_OFFSET:g}), {_MIN:g} to {_MAX:.9g}\n"
                 f"LUT_3D_SIZE {SIDE}\n")
-        np.savetxt(f, nodes, fmt="%.5f")
+        f.write("%.5f %.5f %.5f\n" * len(nodes) % tuple(nodes.ravel().tolist()))
     return {"lut": name, "log2": {"offset": _OFFSET, "min": _MIN, "max": _MAX}}
