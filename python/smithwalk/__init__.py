@@ -113,7 +113,8 @@ class Material:
         conductors), 'two-walk' (for the rest), 'auto' (the better of the two),
         'walk' (the paper's, one-sided) or 'single' (the first order alone).
         `samples`: estimates per pair; the time goes with it.
-        The standard error is that of the mean of `samples` estimates. Those of
+        The standard error is that of the mean of `samples` estimates; one alone has
+        none: NaN, as a read-only view. Those of
         'walk' have heavy tails where a rare first bounce matters: there both the
         value and the error it prints are too small until the rare event comes.
         Source: Heitz et al. 2016, § 4.3; two walks are combined by the balance
@@ -121,6 +122,9 @@ class Material:
         """
         wi, wo, shape = _pairs(wi, wo)
         value, stderr = self._surface.eval(wi, wo, estimator, _count("samples", samples), _seed(seed))
+        if samples == 1:
+            # A million rows of NaN would take a twentieth of the time.
+            return value.reshape(*shape, 3), np.broadcast_to(np.nan, (*shape, 3))
         return value.reshape(*shape, 3), stderr.reshape(*shape, 3)
 
     def eval_orders(
@@ -366,11 +370,12 @@ def _directions(name: str, value: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     vectors = np.asarray(value, float)
     if vectors.ndim == 0 or vectors.shape[-1] != 3:
         raise ValueError(f"{name}: expected directions (…, 3), found shape {vectors.shape}")
-    off = ~(np.abs(np.einsum("...i,...i->...", vectors, vectors) - 1.0) <= 1e-6)
-    if off.any():
-        where = tuple(int(i) for i in np.argwhere(off)[0])
+    flat, shape = np.ascontiguousarray(vectors.reshape(-1, 3)), vectors.shape[:-1]
+    off = _smithwalk.first_not_unit(flat)
+    if off is not None:
+        where = tuple(int(i) for i in np.unravel_index(off, shape)) if shape else ()
         raise ValueError(f"{name}: expected unit vectors; {name}[{', '.join(map(str, where)) or '...'}] is {vectors[where]}")
-    return np.ascontiguousarray(vectors.reshape(-1, 3)), vectors.shape[:-1]
+    return flat, shape
 
 
 def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:

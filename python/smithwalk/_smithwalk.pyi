@@ -10,6 +10,8 @@ _Normals = tuple[str, tuple[float, float], float]
 
 __version__: str
 
+def first_not_unit(rows: _Rows) -> int | None: ...
+
 class Surface:
     @staticmethod
     def conductor_color(normals: _Normals, color: _Triple) -> Surface: ...

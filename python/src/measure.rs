@@ -20,6 +20,21 @@ pub struct Estimate {
     pub standard_error: [f64; 3],
 }
 
+/// Unit vectors as numpy holds them: three numbers each, in place.
+#[derive(Clone, Copy)]
+pub struct Directions<'a>(pub &'a [f64]);
+
+impl Directions<'_> {
+    pub fn len(self) -> usize {
+        self.0.len() / 3
+    }
+
+    fn at(self, point: usize) -> Vector3<f64> {
+        let at = &self.0[3 * point..3 * point + 3];
+        Vector3::new(at[0], at[1], at[2])
+    }
+}
+
 /// Sums of values and of their squares.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
@@ -35,27 +50,30 @@ impl Moments {
         }
     }
 
+    /// Of `n` values, those that were never added being 0.
+    fn estimate(&self, n: u64) -> Estimate {
+        let mut found = Estimate {
+            mean: self.sum,
+            standard_error: [f64::NAN; 3],
+        };
+        if n > 1 {
+            let n = n as f64;
+            for c in 0..3 {
+                let mean = self.sum[c] / n;
+                let variance = (self.squares[c] / n - mean * mean).max(0.0);
+                found.mean[c] = mean;
+                found.standard_error[c] = (variance / (n - 1.0)).sqrt();
+            }
+        }
+        found
+    }
+}
+
+impl Merge for Moments {
     fn merge(&mut self, other: &Self) {
         for c in 0..3 {
             self.sum[c] += other.sum[c];
             self.squares[c] += other.squares[c];
-        }
-    }
-
-    /// Of `n` values, those that were never added being 0.
-    fn estimate(&self, n: u64) -> Estimate {
-        let n = n as f64;
-        let mean = self.sum.map(|sum| sum / n);
-        Estimate {
-            mean,
-            standard_error: [0, 1, 2].map(|c| {
-                let variance = (self.squares[c] / n - mean[c] * mean[c]).max(0.0);
-                if n > 1.0 {
-                    (variance / (n - 1.0)).sqrt()
-                } else {
-                    f64::NAN
-                }
-            }),
         }
     }
 }
@@ -75,83 +93,101 @@ fn generator(seed: u64, point: usize, batch: u64) -> Rng {
     Stream(Pcg64Mcg::seed_from_u64(state))
 }
 
-/// Runs `measure(point, samples, generator)` for every batch of every point,
-/// and gives the batches of each point, in order.
-fn batched<T: Send>(
+/// What batches of samples add up to.
+trait Merge: Send {
+    fn merge(&mut self, other: &Self);
+}
+
+impl<T: Merge> Merge for Vec<T> {
+    fn merge(&mut self, other: &Self) {
+        self.iter_mut().zip(other).for_each(|(a, b)| a.merge(b));
+    }
+}
+
+/// Batches of one point that are held at a time.
+const HELD: u64 = 64;
+
+/// Points of one task, at least: a point of few samples takes less than handing it over.
+const POINTS: usize = 64;
+
+/// Runs `measure(point, samples, generator)` for every batch of every point, and
+/// gives what each point's batches add up to, in order.
+fn batched<T: Merge>(
     points: usize,
     samples: u64,
     seed: u64,
-    measure: impl Fn(usize, u64, &mut Rng) -> T + Sync,
-) -> Vec<Vec<T>> {
+    measure: impl Fn(usize, u64, &mut Rng) -> T + Send + Sync,
+) -> impl IndexedParallelIterator<Item = T> {
     let batches = samples.div_ceil(BATCH);
-    (0..points)
-        .into_par_iter()
-        .map(|point| {
-            (0..batches)
-                .into_par_iter()
-                .map(|batch| {
-                    let count = BATCH.min(samples - batch * BATCH);
-                    measure(point, count, &mut generator(seed, point, batch))
-                })
-                .collect()
-        })
-        .collect()
+    let whole = move |point| {
+        let batch = |batch| {
+            let count = BATCH.min(samples - batch * BATCH);
+            measure(point, count, &mut generator(seed, point, batch))
+        };
+        let mut sum = batch(0);
+        for first in (1..batches).step_by(HELD as usize) {
+            let held = first..batches.min(first + HELD);
+            let found: Vec<T> = held.into_par_iter().map(batch).collect();
+            found.iter().for_each(|found| sum.merge(found));
+        }
+        sum
+    };
+    let least = if batches > 1 { 1 } else { POINTS };
+    (0..points).into_par_iter().with_min_len(least).map(whole)
 }
 
-fn mirrored(v: Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(v.x, v.y, -v.z)
+/// In the frame of the side that is looked at.
+fn framed(below: bool, v: Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, if below { -v.z } else { v.z })
 }
 
-fn total(batches: &[Moments]) -> Moments {
-    let mut sum = Moments::default();
-    batches.iter().for_each(|batch| sum.merge(batch));
-    sum
-}
-
-/// f(ω_i, ω_o) |cosθ_o|, sr⁻¹, of each pair.
+/// f(ω_i, ω_o) |cosθ_o|, sr⁻¹, of each pair: means and their standard errors, which
+/// single samples have none of.
 pub fn eval(
     surface: &Sides,
     method: Method,
-    wi: &[Vector3<f64>],
-    wo: &[Vector3<f64>],
+    wi: Directions<'_>,
+    wo: Directions<'_>,
     samples: u64,
     seed: u64,
-) -> Vec<Estimate> {
-    let batches = batched(wi.len(), samples, seed, |point, count, rng| {
+) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+    let found = batched(wi.len(), samples, seed, |point, count, rng| {
         let mut moments = Moments::default();
-        let Some((side, below)) = surface.seen_from(wi[point]) else {
+        let Some((side, below)) = surface.seen_from(wi.at(point)) else {
             return moments;
         };
-        let frame = if below { mirrored } else { |v| v };
-        let (wi, wo) = (frame(wi[point]), frame(wo[point]));
+        let (wi, wo) = (framed(below, wi.at(point)), framed(below, wo.at(point)));
         for _ in 0..count {
             moments.add(side.eval(method, wi, wo, rng));
         }
         moments
     });
-    batches
-        .iter()
-        .map(|batches| total(batches).estimate(samples))
-        .collect()
+    if samples == 1 {
+        return (found.map(|moments| moments.sum).collect(), Vec::new());
+    }
+    let estimates = found.map(|moments| {
+        let found = moments.estimate(samples);
+        (found.mean, found.standard_error)
+    });
+    estimates.unzip()
 }
 
 /// The same, order by order; the last element has all orders from there on.
 pub fn eval_orders(
     surface: &Sides,
     estimator: Estimator,
-    wi: &[Vector3<f64>],
-    wo: &[Vector3<f64>],
+    wi: Directions<'_>,
+    wo: Directions<'_>,
     orders: usize,
     samples: u64,
     seed: u64,
 ) -> Vec<Vec<Estimate>> {
-    let batches = batched(wi.len(), samples, seed, |point, count, rng| {
+    batched(wi.len(), samples, seed, |point, count, rng| {
         let mut moments = vec![Moments::default(); orders];
-        let Some((side, below)) = surface.seen_from(wi[point]) else {
+        let Some((side, below)) = surface.seen_from(wi.at(point)) else {
             return moments;
         };
-        let frame = if below { mirrored } else { |v| v };
-        let (wi, wo) = (frame(wi[point]), frame(wo[point]));
+        let (wi, wo) = (framed(below, wi.at(point)), framed(below, wo.at(point)));
         let mut found = PerOrder::default();
         for _ in 0..count {
             found.0.clear();
@@ -165,18 +201,9 @@ pub fn eval_orders(
             }
         }
         moments
-    });
-    batches
-        .into_iter()
-        .map(|batches| {
-            (0..orders)
-                .map(|order| {
-                    let batches: Vec<_> = batches.iter().map(|batch| batch[order]).collect();
-                    total(&batches).estimate(samples)
-                })
-                .collect()
-        })
-        .collect()
+    })
+    .map(|moments| moments.iter().map(|m| m.estimate(samples)).collect())
+    .collect()
 }
 
 /// How one walk ended; weight and order are 0 where it was absorbed.
@@ -191,11 +218,10 @@ fn walk(surface: &Sides, wi: Vector3<f64>, rng: &mut Rng) -> Sample {
     let Some((side, below)) = surface.seen_from(wi) else {
         return Sample::default();
     };
-    let frame = if below { mirrored } else { |v| v };
-    match side.sample(frame(wi), rng) {
+    match side.sample(framed(below, wi), rng) {
         None => Sample::default(),
         Some(exit) => {
-            let direction = frame(exit.direction);
+            let direction = framed(below, exit.direction);
             Sample {
                 direction: [direction.x, direction.y, direction.z],
                 weight: exit.weight.0,
@@ -206,21 +232,21 @@ fn walk(surface: &Sides, wi: Vector3<f64>, rng: &mut Rng) -> Sample {
 }
 
 /// One walk from each direction.
-pub fn sample(surface: &Sides, wi: &[Vector3<f64>], seed: u64) -> Vec<Sample> {
-    wi.par_iter()
-        .enumerate()
-        .map(|(point, &wi)| walk(surface, wi, &mut generator(seed, point, 0)))
+pub fn sample(surface: &Sides, wi: Directions<'_>, seed: u64) -> Vec<Sample> {
+    (0..wi.len())
+        .into_par_iter()
+        .map(|point| walk(surface, wi.at(point), &mut generator(seed, point, 0)))
         .collect()
 }
 
 /// The proxy density of each pair, sr⁻¹.
-pub fn pdf(surface: &Sides, wi: &[Vector3<f64>], wo: &[Vector3<f64>]) -> Vec<f64> {
-    wi.par_iter()
-        .zip(wo)
-        .map(|(&wi, &wo)| match surface.seen_from(wi) {
+pub fn pdf(surface: &Sides, wi: Directions<'_>, wo: Directions<'_>) -> Vec<f64> {
+    (0..wi.len())
+        .into_par_iter()
+        .map(|point| (wi.at(point), wo.at(point)))
+        .map(|(wi, wo)| match surface.seen_from(wi) {
             None => 0.0,
-            Some((side, false)) => side.pdf(wi, wo),
-            Some((side, true)) => side.pdf(mirrored(wi), mirrored(wo)),
+            Some((side, below)) => side.pdf(framed(below, wi), framed(below, wo)),
         })
         .collect()
 }
@@ -237,34 +263,48 @@ pub struct Albedo {
     pub mean_order: f64,
 }
 
+/// Sums over walks from one direction.
+struct Sums {
+    sides: [Moments; 2],
+    orders: Vec<f64>,
+    facets: u64,
+    left: u64,
+}
+
+impl Merge for Sums {
+    fn merge(&mut self, other: &Self) {
+        self.sides[0].merge(&other.sides[0]);
+        self.sides[1].merge(&other.sides[1]);
+        self.orders
+            .iter_mut()
+            .zip(&other.orders)
+            .for_each(|(a, b)| *a += b);
+        self.facets += other.facets;
+        self.left += other.left;
+    }
+}
+
 /// Directional albedos, by `samples` walks from each direction.
 pub fn albedo(
     surface: &Sides,
-    wi: &[Vector3<f64>],
+    wi: Directions<'_>,
     orders: usize,
     samples: u64,
     seed: u64,
 ) -> Vec<Albedo> {
-    struct Sums {
-        sides: [Moments; 2],
-        orders: Vec<f64>,
-        facets: u64,
-        left: u64,
-    }
-    let none = || Sums {
-        sides: [Moments::default(); 2],
-        orders: vec![0.0; orders],
-        facets: 0,
-        left: 0,
-    };
-    let batches = batched(wi.len(), samples, seed, |point, count, rng| {
-        let mut sums = none();
+    batched(wi.len(), samples, seed, |point, count, rng| {
+        let mut sums = Sums {
+            sides: [Moments::default(); 2],
+            orders: vec![0.0; orders],
+            facets: 0,
+            left: 0,
+        };
         for _ in 0..count {
-            let end = walk(surface, wi[point], rng);
+            let end = walk(surface, wi.at(point), rng);
             if end.order == 0 {
                 continue;
             }
-            let transmitted = end.direction[2] * wi[point].z < 0.0;
+            let transmitted = end.direction[2] * wi.at(point).z < 0.0;
             sums.sides[usize::from(transmitted)].add(Rgb(end.weight));
             sums.orders[(end.order as usize).min(orders) - 1] +=
                 end.weight.iter().sum::<f64>() / 3.0;
@@ -272,27 +312,14 @@ pub fn albedo(
             sums.left += 1;
         }
         sums
-    });
-    let one = |batches: Vec<Sums>| {
-        let mut all = none();
-        for batch in batches {
-            all.sides[0].merge(&batch.sides[0]);
-            all.sides[1].merge(&batch.sides[1]);
-            all.orders
-                .iter_mut()
-                .zip(batch.orders)
-                .for_each(|(a, b)| *a += b);
-            all.facets += batch.facets;
-            all.left += batch.left;
-        }
-        Albedo {
-            reflected: all.sides[0].estimate(samples),
-            transmitted: all.sides[1].estimate(samples),
-            orders: all.orders.iter().map(|sum| sum / samples as f64).collect(),
-            mean_order: all.facets as f64 / all.left as f64,
-        }
-    };
-    batches.into_iter().map(one).collect()
+    })
+    .map(|sums| Albedo {
+        reflected: sums.sides[0].estimate(samples),
+        transmitted: sums.sides[1].estimate(samples),
+        orders: sums.orders.iter().map(|sum| sum / samples as f64).collect(),
+        mean_order: sums.facets as f64 / sums.left as f64,
+    })
+    .collect()
 }
 
 /// Weight that walks from `wi` carry into each of `bins` = [cosines, azimuths]
@@ -308,7 +335,7 @@ pub fn lobe(
     let [rows, columns] = bins;
     let count = rows * columns;
     let per_steradian = count as f64 / (4.0 * std::f64::consts::PI);
-    let batches = batched(1, samples, seed, |_, walks, rng| {
+    batched(1, samples, seed, |_, walks, rng| {
         let mut moments = vec![Moments::default(); count];
         for _ in 0..walks {
             let end = walk(surface, wi, rng);
@@ -322,11 +349,7 @@ pub fn lobe(
             moments[row * columns + column].add(Rgb(end.weight) * per_steradian);
         }
         moments
-    });
-    (0..count)
-        .map(|bin| {
-            let of_bin: Vec<_> = batches[0].iter().map(|batch| batch[bin]).collect();
-            total(&of_bin).estimate(samples)
-        })
-        .collect()
+    })
+    .flat_map_iter(|bins| bins.into_iter().map(|m| m.estimate(samples)))
+    .collect()
 }

@@ -10,7 +10,7 @@ use smithwalk_model::{
     Rgb, StudentT, Vector3,
 };
 
-use crate::measure::{self, Albedo};
+use crate::measure::{self, Albedo, Directions};
 use crate::scatter::{Method, Sides};
 
 /// A rough surface.
@@ -101,15 +101,6 @@ fn method(name: &str) -> PyResult<Method> {
     })
 }
 
-/// Rows of three numbers as vectors.
-fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<Vector3<f64>> {
-    let rows = rows.as_array();
-    rows.rows()
-        .into_iter()
-        .map(|row| Vector3::new(row[0], row[1], row[2]))
-        .collect()
-}
-
 type Columns<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 type Blocks<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
 type Samples<'py> = (
@@ -118,13 +109,14 @@ type Samples<'py> = (
     Bound<'py, PyArray1<u32>>,
 );
 
-fn columns<'py>(py: Python<'py>, found: Vec<measure::Estimate>) -> Columns<'py> {
-    let array = |value: fn(&measure::Estimate) -> [f64; 3]| {
-        let flat: Vec<f64> = found.iter().flat_map(value).collect();
-        let rows = Array2::from_shape_vec((found.len(), 3), flat);
-        rows.expect("three channels each").into_pyarray(py)
-    };
-    (array(|e| e.mean), array(|e| e.standard_error))
+fn rows<'py>(py: Python<'py>, found: Vec<[f64; 3]>) -> Bound<'py, PyArray2<f64>> {
+    let rows = Array2::from_shape_vec((found.len(), 3), found.into_flattened());
+    rows.expect("three numbers each").into_pyarray(py)
+}
+
+fn columns<'py>(py: Python<'py>, found: impl Iterator<Item = measure::Estimate>) -> Columns<'py> {
+    let (means, errors) = found.map(|e| (e.mean, e.standard_error)).unzip();
+    (rows(py, means), rows(py, errors))
 }
 
 #[pymethods]
@@ -183,9 +175,9 @@ impl Surface {
         seed: u64,
     ) -> PyResult<Columns<'py>> {
         let method = method(estimator)?;
-        let (wi, wo) = (vectors(&wi), vectors(&wo));
-        let found = py.detach(|| measure::eval(&self.0, method, &wi, &wo, samples, seed));
-        Ok(columns(py, found))
+        let (wi, wo) = (Directions(wi.as_slice()?), Directions(wo.as_slice()?));
+        let (means, errors) = py.detach(|| measure::eval(&self.0, method, wi, wo, samples, seed));
+        Ok((rows(py, means), rows(py, errors)))
     }
 
     #[allow(clippy::too_many_arguments)] // as Python calls it
@@ -204,9 +196,9 @@ impl Surface {
                 "estimator: 'single' has one order; use eval",
             ));
         };
-        let (wi, wo) = (vectors(&wi), vectors(&wo));
+        let (wi, wo) = (Directions(wi.as_slice()?), Directions(wo.as_slice()?));
         let found =
-            py.detach(|| measure::eval_orders(&self.0, estimator, &wi, &wo, orders, samples, seed));
+            py.detach(|| measure::eval_orders(&self.0, estimator, wi, wo, orders, samples, seed));
         let array = |value: fn(&measure::Estimate) -> [f64; 3]| {
             let flat: Vec<f64> = found.iter().flatten().flat_map(value).collect();
             let blocks = Array3::from_shape_vec((wi.len(), orders, 3), flat);
@@ -220,20 +212,16 @@ impl Surface {
         py: Python<'py>,
         wi: PyReadonlyArray2<'py, f64>,
         seed: u64,
-    ) -> Samples<'py> {
-        let wi = vectors(&wi);
-        let found = py.detach(|| measure::sample(&self.0, &wi, seed));
-        let rows = |value: fn(&measure::Sample) -> [f64; 3]| {
-            let flat: Vec<f64> = found.iter().flat_map(value).collect();
-            let rows = Array2::from_shape_vec((found.len(), 3), flat);
-            rows.expect("three components each").into_pyarray(py)
-        };
+    ) -> PyResult<Samples<'py>> {
+        let wi = Directions(wi.as_slice()?);
+        let found = py.detach(|| measure::sample(&self.0, wi, seed));
         let orders: Array1<u32> = found.iter().map(|s| s.order).collect();
-        (
-            rows(|s| s.direction),
-            rows(|s| s.weight),
+        let (directions, weights) = found.iter().map(|s| (s.direction, s.weight)).unzip();
+        Ok((
+            rows(py, directions),
+            rows(py, weights),
             orders.into_pyarray(py),
-        )
+        ))
     }
 
     fn pdf<'py>(
@@ -241,10 +229,10 @@ impl Surface {
         py: Python<'py>,
         wi: PyReadonlyArray2<'py, f64>,
         wo: PyReadonlyArray2<'py, f64>,
-    ) -> Bound<'py, PyArray1<f64>> {
-        let (wi, wo) = (vectors(&wi), vectors(&wo));
-        let found = py.detach(|| measure::pdf(&self.0, &wi, &wo));
-        Array1::from_vec(found).into_pyarray(py)
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (wi, wo) = (Directions(wi.as_slice()?), Directions(wo.as_slice()?));
+        let found = py.detach(|| measure::pdf(&self.0, wi, wo));
+        Ok(Array1::from_vec(found).into_pyarray(py))
     }
 
     /// Reflected and transmitted shares with their standard errors, the share
@@ -257,25 +245,24 @@ impl Surface {
         orders: usize,
         samples: u64,
         seed: u64,
-    ) -> (
+    ) -> PyResult<(
         Columns<'py>,
         Columns<'py>,
         Bound<'py, PyArray2<f64>>,
         Bound<'py, PyArray1<f64>>,
-    ) {
-        let wi = vectors(&wi);
-        let found = py.detach(|| measure::albedo(&self.0, &wi, orders, samples, seed));
-        let side =
-            |side: fn(&Albedo) -> measure::Estimate| columns(py, found.iter().map(side).collect());
+    )> {
+        let wi = Directions(wi.as_slice()?);
+        let found = py.detach(|| measure::albedo(&self.0, wi, orders, samples, seed));
+        let side = |side: fn(&Albedo) -> measure::Estimate| columns(py, found.iter().map(side));
         let shares: Vec<f64> = found.iter().flat_map(|a| a.orders.clone()).collect();
         let shares = Array2::from_shape_vec((found.len(), orders), shares);
         let mean: Array1<f64> = found.iter().map(|a| a.mean_order).collect();
-        (
+        Ok((
             side(|a| a.reflected),
             side(|a| a.transmitted),
             shares.expect("all have as many orders").into_pyarray(py),
             mean.into_pyarray(py),
-        )
+        ))
     }
 
     /// Walks from `wi`, binned by direction: mean weight and standard error of
@@ -290,6 +277,6 @@ impl Surface {
     ) -> Columns<'py> {
         let wi = Vector3::new(wi[0], wi[1], wi[2]);
         let found = py.detach(|| measure::lobe(&self.0, wi, bins, samples, seed));
-        columns(py, found)
+        columns(py, found.into_iter())
     }
 }
