@@ -23,7 +23,7 @@ shell_syntax() { scripts -name '*.sh' | xargs -0 -n 1 bash -n && bash -n .ci/run
 # The Python package as users get it: a wheel in a virtual environment with numpy alone.
 python_package() {
     local venv=target/python
-    { [[ -x $venv/bin/maturin ]] || { python3 -m venv $venv && $venv/bin/pip install -q maturin pytest numpy; }; } &&
+    { [[ -x $venv/bin/maturin ]] || { python3 -m venv $venv && $venv/bin/pip install -q maturin pytest numpy OpenEXR; }; } &&
         rm -rf $venv/wheel && $venv/bin/maturin build -m python/Cargo.toml --out $venv/wheel &&
         $venv/bin/pip install -q --force-reinstall --no-deps $venv/wheel/*.whl &&
         $venv/bin/python -m pytest -q python/tests

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _smithwalk
+from ._command import Render, RenderError, SceneMaterial, material, principled, render
 
 __version__: str = _smithwalk.__version__
 __all__ = [
@@ -37,11 +38,17 @@ __all__ = [
     "Interface",
     "Lobe",
     "Material",
+    "Render",
+    "RenderError",
+    "SceneMaterial",
     "conductor",
     "dielectric",
     "diffuse",
     "lambert",
     "layered",
+    "material",
+    "principled",
+    "render",
     "spherical",
 ]
 
