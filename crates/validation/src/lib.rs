@@ -30,6 +30,7 @@ pub mod precision;
 mod second_order;
 mod slopes;
 pub mod statistics;
+pub mod tables;
 mod transport;
 
 pub use check::{Case, Check, Statement};

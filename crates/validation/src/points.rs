@@ -52,15 +52,15 @@ impl Draw<f32> for Sobol {
     }
 }
 
-/// The mean of `estimate` over [`REPLICATES`] times `samples` points, with the error
-/// that the scramblings show.
-pub fn replicated(
+/// The means of `N` quantities over [`REPLICATES`] times `samples` points, with the
+/// errors that the scramblings show.
+pub fn replicated_many<const N: usize>(
     check: u64,
     first_seed: u32,
     samples: u32,
-    mut estimate: impl FnMut(&mut Sobol) -> f64,
-) -> Mean {
-    let mut means = Mean::default();
+    mut estimate: impl FnMut(&mut Sobol) -> [f64; N],
+) -> [Mean; N] {
+    let mut means = [Mean::default(); N];
     for seed in first_seed..first_seed + REPLICATES {
         let mut points = Sobol {
             index: 0,
@@ -69,14 +69,29 @@ pub fn replicated(
             block: [0.0; 4],
             rest: stream(check, seed as usize),
         };
-        let mut sum = 0.0;
+        let mut sums = [0.0; N];
         for i in 0..samples {
             (points.index, points.dimension) = (i % SEQUENCE, 0);
             // The hash of seeds makes every sequence another scrambling.
             points.seed = seed ^ (i / SEQUENCE) << 26;
-            sum += estimate(&mut points);
+            for (sum, x) in sums.iter_mut().zip(estimate(&mut points)) {
+                *sum += x;
+            }
         }
-        means.add(sum / f64::from(samples));
+        for (mean, sum) in means.iter_mut().zip(sums) {
+            mean.add(sum / f64::from(samples));
+        }
     }
     means
+}
+
+/// [`replicated_many`] of one quantity.
+pub fn replicated(
+    check: u64,
+    first_seed: u32,
+    samples: u32,
+    mut estimate: impl FnMut(&mut Sobol) -> f64,
+) -> Mean {
+    let [mean] = replicated_many(check, first_seed, samples, |rng| [estimate(rng)]);
+    mean
 }
