@@ -404,3 +404,37 @@ fn progress_is_one_object_a_line() {
         assert!(last.get(field).is_some(), "{field}");
     }
 }
+
+/// A film that is gone on with is there beside the pilots: with the memory that a fresh
+/// render has to have, it is refused before anything is rendered.
+#[test]
+fn memory_for_a_film_to_go_on_from_is_asked_for() {
+    let room = Room::new("memory");
+    let [scene, film] = ["scene.yaml", "a.film"].map(|name| room.file(name));
+    let render = |spp: &str, more: &[&str]| {
+        let mut args = vec!["render", &scene, "--spp", spp, "-o", &film];
+        args.extend(more);
+        command(&args).output().expect("the program starts")
+    };
+    assert!(render("1", &[]).status.success());
+    let bytes = std::fs::metadata(&film).unwrap().len();
+    let enough = |limit: u64, more: &[&str]| {
+        let limit = limit.to_string();
+        let mut args = vec!["--memory", limit.as_str()];
+        args.extend(more);
+        render("2", &args).status.success()
+    };
+    // The least that a fresh render gets along with, to a tenth of the film.
+    let (mut too_little, mut least) = (0, 1 << 32);
+    while least - too_little > bytes / 10 {
+        let middle = u64::midpoint(too_little, least);
+        if enough(middle, &[]) {
+            least = middle;
+        } else {
+            too_little = middle;
+        }
+    }
+    assert!(render("1", &[]).status.success());
+    assert!(!enough(least + bytes / 2, &["--resume"]));
+    assert!(enough(least + bytes * 11 / 10, &["--resume"]));
+}

@@ -211,9 +211,8 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let outputs = Outputs::new(args, None)?;
     start_threads(args)?;
     let settings = override_settings(args, RenderSettings::new(&description))?;
-    let resolved = args
-        .scene
-        .resolve_beside(&description, settings.memory(), log)?;
+    let film = settings.memory() + outputs.resumed_bytes(args);
+    let resolved = args.scene.resolve_beside(&description, film, log)?;
     let signals = Signals::listen()?;
     let shot = Shot {
         args,

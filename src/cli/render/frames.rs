@@ -42,7 +42,8 @@ pub fn run(
         let frame = describe(number)?;
         let description = &frame.description;
         let settings = override_settings(args, RenderSettings::new(description))?;
-        let film = settings.memory();
+        let outputs = Outputs::new(args, Some(number))?;
+        let film = settings.memory() + outputs.resumed_bytes(args);
         let resolved = args.scene.resolve_frame(&frame, &mut stage, film, log)?;
         let signals = match &mut signals {
             Some(signals) => signals,
@@ -51,7 +52,6 @@ pub fn run(
         if signals.interrupt().load(Ordering::Relaxed) {
             break;
         }
-        let outputs = Outputs::new(args, Some(number))?;
         let display = display(description)?;
         let mark = complete_mark(&resolved.identity, description, &settings);
         if args.resume && outputs.are_complete(&mark) {

@@ -89,6 +89,13 @@ impl Outputs {
         })
     }
 
+    /// What the film that the render goes on from takes, in bytes: it is there before the
+    /// pilots, which a fresh one comes after.
+    pub fn resumed_bytes(&self, args: &Args) -> u64 {
+        let film = args.resume.then(|| std::fs::metadata(&self.film));
+        film.map_or(0, |film| film.map_or(0, |film| film.len()))
+    }
+
     /// Whether all images are there, and one of them says that it is complete by this
     /// mark. A film that is there is of an interrupted render.
     pub fn are_complete(&self, mark: &str) -> bool {
