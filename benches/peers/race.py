@@ -64,17 +64,15 @@ class Worker:
 class Smithwalk:
     """This renderer, one process for each image; the times are its own figures."""
 
-    def __init__(self, binary, scene, estimator):
-        self.name, self.binary, self.estimator = f"smithwalk {estimator}", binary, estimator
-        self.scene = os.path.join(ROOT, "scenes", scene, "scene.yaml")
+    def __init__(self, name, binary, scene, *arguments):
+        self.name, self.binary, self.scene, self.arguments = f"smithwalk {name}", binary, scene, arguments
 
     def render(self, jobs, _folder):
         """Render all jobs; returns version and times."""
         times = []
         for job in jobs:
             text = run([self.binary, "render", self.scene, "-o", job["out"],
-                        "--spp", str(job["spp"]), "--seed", str(job["seed"]),
-                        "--estimator", self.estimator])
+                        "--spp", str(job["spp"]), "--seed", str(job["seed"]), *self.arguments])
             found = re.search(r"spp in ([\d.]+) s \(([\d.]+) s CPU\)", text)
             times.append({"wall_s": float(found[1]), "cpu_s": float(found[2])})
         return run([self.binary, "--version"]).strip(), times
@@ -83,8 +81,9 @@ class Smithwalk:
 def contenders(args, scene):
     """Everyone who can take part in a scene, and who can't."""
     able, missing = [], []
+    path = os.path.join(ROOT, "scenes", scene, "scene.yaml")
     for estimator in ("auto", "single", "compensated"):
-        able.append(Smithwalk(args.smithwalk, scene, estimator))
+        able.append(Smithwalk(estimator, args.smithwalk, path, "--estimator", estimator))
 
     blend = os.path.join(args.output, scene + ".blend")
     cycles = os.path.join(HERE, "cycles_worker.py")
