@@ -1,6 +1,6 @@
 //! Surfaces made of layers.
 
-use super::material::{Factor, Material, MaterialRef};
+use super::material::{Factor, Material, MaterialRef, ThinFilm};
 use super::relief::{Bump, NormalMap, Relief};
 use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
@@ -42,6 +42,8 @@ pub struct Interface {
     pub ior: Scalar,
     /// What the slab below absorbs.
     pub slab: Slab,
+    /// A film on the interface.
+    pub film: Option<ThinFilm>,
 }
 
 /// What a slab absorbs.
@@ -66,6 +68,7 @@ raw_rough! {
         absorption: Option<Color>,
         thickness: Option<Scalar>,
         transmittance: Option<Color>,
+        thin_film: Option<ThinFilm>,
     }
 }
 
@@ -108,6 +111,7 @@ impl TryFrom<RawInterface> for Interface {
             rough,
             ior: raw.ior.unwrap_or(Scalar::Value(1.5)),
             slab,
+            film: raw.thin_film,
         })
     }
 }
@@ -154,6 +158,9 @@ impl Interface {
     fn check(&self, check: &mut Check<'_, '_>, at: &At) {
         self.rough.check(check, at);
         check.scalar(&self.ior, Range::Positive, at.key("ior"));
+        if let Some(film) = &self.film {
+            film.check(check, &at.key("thin_film"));
+        }
         match &self.slab {
             Slab::Clear => {}
             Slab::Absorbing {

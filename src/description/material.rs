@@ -115,6 +115,13 @@ pub struct ThinFilm {
     pub thickness: Scalar,
 }
 
+impl ThinFilm {
+    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+        check.scalar(&self.ior, Range::Positive, at.key("ior"));
+        check.scalar(&self.thickness, Range::NonNegative, at.key("thickness"));
+    }
+}
+
 fn water() -> Scalar {
     Scalar::Value(1.33)
 }
@@ -695,13 +702,7 @@ impl Reflectance {
     fn check(&self, check: &mut Check<'_, '_>, at: &At) {
         match self {
             Self::Film { film, below } => {
-                let film_at = at.key("thin_film");
-                check.scalar(&film.ior, Range::Positive, film_at.key("ior"));
-                check.scalar(
-                    &film.thickness,
-                    Range::NonNegative,
-                    film_at.key("thickness"),
-                );
+                film.check(check, &at.key("thin_film"));
                 below.check(check, at);
             }
             Reflectance::Color(color) => check.color(color, Range::UNIT, at.key("color")),

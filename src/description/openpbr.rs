@@ -87,6 +87,12 @@ parameters! {
     coat_ior: Scalar = 1.6, Range::Positive;
     /// How far reflections inside of the coat darken the base; by walks they do.
     coat_darkening: Scalar = 1.0, Range::UNIT;
+    /// How much of the base a thin film covers.
+    thin_film_weight: Scalar = 0.0, Range::UNIT;
+    /// Its thickness, µm.
+    thin_film_thickness: Scalar = 0.5, Range::NonNegative;
+    /// Index of refraction of the film, absolute.
+    thin_film_ior: Scalar = 1.4, Range::Positive;
     /// How much fuzz there is.
     fuzz_weight: Scalar = 0.0, Range::UNIT;
     /// A factor on its light.

@@ -66,6 +66,8 @@ pub struct Principled {
     pub normal: Option<NormalMap>,
     /// What leans it.
     pub bump: Option<Bump>,
+    /// Whether its thin film lies on metal too, as it does since 5.0.
+    pub filmed_metal: bool,
     /// The values.
     pub sockets: Sockets,
 }
@@ -346,6 +348,7 @@ impl TryFrom<Raw> for Principled {
             tangent: raw.tangent,
             normal: raw.normal,
             bump: raw.bump,
+            filmed_metal: raw.version == Version::V5_0,
             sockets,
         })
     }

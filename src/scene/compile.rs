@@ -14,7 +14,7 @@ use arrayvec::ArrayVec;
 use super::attributes::Attributes;
 use super::material::{
     Bump, Facet, Factor, Leaf, Material, NormalMap, Number, Perturbation, Reflectance,
-    RoughMaterial, Roughness, Tangent, Tint, VertexColors, WeightedLeaf,
+    RoughMaterial, Roughness, Tangent, ThinFilm, Tint, VertexColors, WeightedLeaf,
 };
 use crate::bsdf::{Albedos, Distribution, MAX_CLOSURES, Method, WhiteFacets};
 use crate::color::Rgb;
@@ -559,8 +559,7 @@ impl<'a> Compiler<'a> {
             },
             desc::Reflectance::Film { film, below } => match self.metal(below)? {
                 Reflectance::Complex { eta, k } => Reflectance::Film {
-                    ior: self.number(&film.ior)?,
-                    thickness: self.number(&film.thickness)?,
+                    film: self.film(film)?,
                     eta,
                     k,
                 },
@@ -570,6 +569,13 @@ impl<'a> Compiler<'a> {
                 f0: self.tint(f0)?,
                 tint: self.tint(tint)?,
             },
+        })
+    }
+
+    fn film(&mut self, film: &desc::ThinFilm) -> Result<ThinFilm, MaterialError> {
+        Ok(ThinFilm {
+            ior: self.number(&film.ior)?,
+            thickness: self.number(&film.thickness)?,
         })
     }
 

@@ -90,6 +90,7 @@ fn rough(alpha: (f64, f64), method: Method) -> Vec<Subject> {
             eta,
             reflection: Rgb([1.0, 0.5, 0.0]),
             transmission: Rgb([1.0, 0.0, 0.5]),
+            film: None,
         };
         let name = format!("coloured η {eta}");
         let first = list.len();
@@ -97,7 +98,7 @@ fn rough(alpha: (f64, f64), method: Method) -> Vec<Subject> {
         // Where a channel reflects less than white facets, more of it is let through
         // than the chance to go there says.
         for subject in &mut list[first..] {
-            subject.most = glass.transmitted().max_channel().max(1.0);
+            subject.most = glass.transmitted(Side::Above, 1.0).max_channel().max(1.0);
         }
         let name = format!("refraction η {eta}");
         each_distribution(

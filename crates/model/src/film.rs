@@ -1,6 +1,6 @@
 //! Thin films: light that is reflected at both sides of one interferes.
 
-use crate::{Real, Rgb};
+use crate::{Real, Rgb, fresnel};
 
 /// A film on a facet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +9,8 @@ pub struct Film<F> {
     pub ior: F,
     /// Thickness in nm.
     pub thickness: F,
+    /// The share of the facets that it covers.
+    pub cover: F,
 }
 
 /// The interfaces of a film at one angle and for one polarisation, which is all but the
@@ -55,33 +57,111 @@ impl<F: Real> Film<F> {
     /// of Wyman, Sloan and Shirley 2013, each normalised; what comes out of their negative
     /// parts is clamped to [0, 1].
     pub fn reflectance(&self, cos: F, eta: Rgb<F>, k: Rgb<F>) -> Rgb<F> {
+        let bare = |c: usize| fresnel::complex(cos.max(F::zero()), eta.0[c], k.0[c]);
+        let Some(way) = Way::into(self, cos) else {
+            return self.covering(Rgb::white(), bare);
+        };
+        let covered = Rgb(std::array::from_fn(|channel| {
+            let [s, p] = way.onto(&Base::new(eta.0[channel], k.0[channel], way.sin2));
+            let mut sum = F::zero();
+            for row in &SPECTRUM {
+                let delta = way.length / F::of(row[0]);
+                let both = s.reflectance(delta) + p.reflectance(delta);
+                sum += F::of(0.5 * row[1 + channel]) * both;
+            }
+            sum.max(F::zero()).min(F::one())
+        }));
+        self.covering(covered, bare)
+    }
+
+    /// The same of facets between two media that absorb nothing, `eta` being
+    /// n(far side) / n(near side). What is not reflected goes through, and as much goes
+    /// through from the other side ([`Self::inverted`]) along the refracted ray. A film
+    /// thinner in index than both media lets nothing through beyond its critical angle,
+    /// however thin it is.
+    pub fn on_dielectric(&self, cos: F, eta: F) -> Rgb<F> {
+        let bare = |_| fresnel::dielectric(cos.max(F::zero()), eta).0;
+        let Some(way) = Way::into(self, cos) else {
+            return self.covering(Rgb::white(), bare);
+        };
+        let [s, p] = way.onto(&Base::new(eta, F::zero(), way.sin2));
+        let mut sums = [F::zero(); 3];
+        for row in &SPECTRUM {
+            let delta = way.length / F::of(row[0]);
+            let mean = F::of(0.5) * (s.reflectance(delta) + p.reflectance(delta));
+            for (sum, &weight) in sums.iter_mut().zip(&row[1..]) {
+                *sum += F::of(weight) * mean;
+            }
+        }
+        self.covering(Rgb(sums.map(|sum| sum.max(F::zero()).min(F::one()))), bare)
+    }
+
+    /// The film as it is seen from the far side, whose index is `eta` times that of the
+    /// near side.
+    #[must_use]
+    pub fn inverted(&self, eta: F) -> Self {
+        Self {
+            ior: self.ior / eta,
+            // As long as before in wavelengths.
+            thickness: self.thickness * eta,
+            ..*self
+        }
+    }
+
+    fn covering(&self, covered: Rgb<F>, bare: impl Fn(usize) -> F) -> Rgb<F> {
+        if self.cover == F::one() {
+            return covered;
+        }
+        Rgb(std::array::from_fn(|c| {
+            covered.0[c] * self.cover + bare(c) * (F::one() - self.cover)
+        }))
+    }
+}
+
+/// The way of light through a film.
+struct Way<F> {
+    /// Of the film, relative to the outside.
+    ior: F,
+    /// sin²θ outside.
+    sin2: F,
+    /// cosθ inside.
+    inside: F,
+    /// The amplitudes r₁₂ of both polarisations.
+    outer: [F; 2],
+    /// 4π d n cosθ₂ in nm: the phase of one way there and back, times the wavelength.
+    length: F,
+}
+
+impl<F: Real> Way<F> {
+    /// `None` under total reflection.
+    fn into(film: &Film<F>, cos: F) -> Option<Self> {
         let (zero, one) = (F::zero(), F::one());
         let cos = cos.max(zero).min(one);
         let sin2 = (one - cos) * (one + cos);
-        let n = self.ior;
+        let n = film.ior;
         let square = one - sin2 / (n * n);
         if square <= zero {
-            // Total reflection at the film, however thin.
-            return Rgb::white();
+            return None;
         }
         let inside = square.sqrt();
         // r = (a − b)/(a + b) with the admittances a and b.
         let ratio = |a: F, b: F| if a + b > zero { (a - b) / (a + b) } else { one };
-        let outer = [ratio(cos, n * inside), ratio(n * cos, inside)];
-        // 4π d n cosθ₂, over the wavelength in nm.
-        let way = F::of(4.0) * F::PI() * self.thickness * n * inside;
-        Rgb(std::array::from_fn(|channel| {
-            let base = Base::new(eta.0[channel], k.0[channel], sin2);
-            let [s, p] = base.amplitudes(n, inside);
-            let [s, p] = [Polarised::new(outer[0], s), Polarised::new(outer[1], p)];
-            let mut sum = zero;
-            for row in &SPECTRUM {
-                let delta = way / F::of(row[0]);
-                let both = s.reflectance(delta) + p.reflectance(delta);
-                sum += F::of(0.5 * row[1 + channel]) * both;
-            }
-            sum.max(zero).min(one)
-        }))
+        Some(Self {
+            ior: n,
+            sin2,
+            inside,
+            outer: [ratio(cos, n * inside), ratio(n * cos, inside)],
+            length: F::of(4.0) * F::PI() * film.thickness * n * inside,
+        })
+    }
+
+    /// Both polarisations, with what is below the film.
+    fn onto(&self, base: &Base<F>) -> [Polarised<F>; 2] {
+        let [s, p] = base.amplitudes(self.ior, self.inside);
+        [
+            Polarised::new(self.outer[0], s),
+            Polarised::new(self.outer[1], p),
+        ]
     }
 }
 
@@ -171,7 +251,6 @@ const SPECTRUM: [[f64; 4]; WAVELENGTHS] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fresnel;
 
     /// A film of no thickness is none: what is below shows as it is.
     #[test]
@@ -182,6 +261,7 @@ mod tests {
                     let film = Film {
                         ior,
                         thickness: 0.0,
+                        cover: 1.0,
                     };
                     let found = film.reflectance(cos, Rgb::splat(eta), Rgb::splat(k));
                     let expected = fresnel::complex(cos, eta, k);
@@ -202,6 +282,7 @@ mod tests {
         let film = Film {
             ior: 1.5,
             thickness: 700.0,
+            cover: 1.0,
         };
         for cos in [1.0, 0.5, 0.1f64] {
             let found = film.reflectance(cos, Rgb::splat(1.5), Rgb::splat(0.0));
@@ -239,23 +320,23 @@ mod tests {
         ] {
             for thickness in [50.0, 200.0, 400.0, 650.0, 900.0, 1000.0, 1500.0, 2000.0] {
                 for cos in [1.0, 0.6, 0.2f64] {
-                    let film = Film { ior, thickness };
+                    let film = Film {
+                        ior,
+                        thickness,
+                        cover: 1.0,
+                    };
                     let found = film.reflectance(cos, Rgb::splat(eta), Rgb::splat(k));
-                    let sin2 = 1.0 - cos * cos;
-                    let inside = (1.0 - sin2 / (ior * ior)).sqrt();
-                    let base = Base::new(eta, k, sin2);
-                    let [s, p] = base.amplitudes(ior, inside);
-                    let ratio = |a: f64, b: f64| (a - b) / (a + b);
-                    let s = Polarised::new(ratio(cos, ior * inside), s);
-                    let p = Polarised::new(ratio(ior * cos, inside), p);
-                    let way = 4.0 * std::f64::consts::PI * thickness * ior * inside;
+                    let way = Way::into(&film, cos).expect("denser than the outside");
+                    let [s, p] = way.onto(&Base::new(eta, k, way.sin2));
                     for (c, row) in rec709.iter().enumerate() {
                         let (mut sum, mut whole) = (0.0, 0.0);
                         for l in 380..=780 {
                             let l = f64::from(l);
                             let weight: f64 = row.iter().zip(xyz(l)).map(|(m, x)| m * x).sum();
                             whole += weight;
-                            sum += weight * 0.5 * (s.reflectance(way / l) + p.reflectance(way / l));
+                            sum += weight
+                                * 0.5
+                                * (s.reflectance(way.length / l) + p.reflectance(way.length / l));
                         }
                         let off = (found.0[c] - (sum / whole).clamp(0.0, 1.0)).abs();
                         let class = usize::from(thickness > 1000.0);
@@ -265,5 +346,42 @@ mod tests {
             }
         }
         assert!(worst[0] < 0.0034 && worst[1] < 0.023, "{worst:?}");
+    }
+
+    /// Glass below a film reflects as a metal of no absorption does, from either side as
+    /// much along the same ray.
+    #[test]
+    fn a_film_on_glass_is_the_same_from_both_sides() {
+        for (ior, eta) in [(1.33, 1.5), (2.0, 1.5), (1.8, 1.1), (1.4, 1.0 / 1.5)] {
+            for thickness in [0.0, 150.0, 400.0, 1200.0] {
+                for cover in [1.0, 0.4] {
+                    let film = Film {
+                        ior,
+                        thickness,
+                        cover,
+                    };
+                    for cos in [1.0, 0.8, 0.3, 0.1f64] {
+                        let found = film.on_dielectric(cos, eta);
+                        let metal = film.reflectance(cos, Rgb::splat(eta), Rgb::splat(0.0));
+                        let (_, cos_t) = fresnel::dielectric(cos, eta);
+                        let back = film.inverted(eta).on_dielectric(cos_t, eta.recip());
+                        for c in 0..3 {
+                            assert!(
+                                (found.0[c] - metal.0[c]).abs() < 1e-12,
+                                "{film:?}, {eta}, {cos}"
+                            );
+                            assert!(
+                                cos_t == 0.0 || (found.0[c] - back.0[c]).abs() < 1e-9,
+                                "{film:?}, {eta}, {cos}: {found:?}, {back:?}"
+                            );
+                            assert!(
+                                cos_t > 0.0 || found.0[c] > 1.0 - 2e-6,
+                                "{film:?}, {eta}, {cos}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
     }
 }

@@ -107,6 +107,34 @@ pub fn f82<F: Real>(cos: F, f0: F, f82: F) -> F {
         .min(one)
 }
 
+/// The complex index η + ik whose reflectance is `f0` at normal incidence and, as nearly
+/// as any can, `f82` at cosθ = 1/7.
+///
+/// All indices of one reflectance r at normal incidence have η from (1 − r)/(1 + r) to
+/// (1 + √r)/(1 − √r) (Gulbrandsen 2014, "Artist Friendly Metallic Fresnel"); the larger
+/// η, the less is reflected near 82°.
+pub fn complex_through<F: Real>(f0: F, f82: F) -> (F, F) {
+    let (zero, one, half) = (F::zero(), F::one(), F::of(0.5));
+    // All that is reflected by none has an infinite index.
+    let r = f0.max(zero).min(F::of(0.9999));
+    let root = r.sqrt();
+    let extinction = |eta: F| {
+        let square = (r * (eta + one) * (eta + one) - (eta - one) * (eta - one)) / (one - r);
+        square.max(zero).sqrt()
+    };
+    let (mut low, mut high) = ((one - r) / (one + r), (one + root) / (one - root));
+    for _ in 0..24 {
+        let middle = half * (low + high);
+        if complex(F::of(1.0 / 7.0), middle, extinction(middle)) > f82 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let eta = half * (low + high);
+    (eta, extinction(eta))
+}
+
 /// A dielectric's reflectance at normal incidence, ((η − 1)/(η + 1))².
 #[inline]
 pub fn normal_reflectance<F: Real>(eta: F) -> F {
@@ -215,6 +243,7 @@ impl ConductorFresnel<f64> {
                 film: Film {
                     ior: film.ior as f32,
                     thickness: film.thickness as f32,
+                    cover: film.cover as f32,
                 },
                 eta: rgb(eta),
                 k: rgb(k),
@@ -315,6 +344,32 @@ mod tests {
         for c in 0..3 {
             assert!((curve.reflectance(1.0).0[c] - f0.0[c]).abs() < 1e-14);
             assert!((curve.reflectance(0.0).0[c] - f90.0[c]).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn complex_indices_go_through_two_reflectances() {
+        // Silver, copper, iron: what they reflect leads back to it.
+        for (eta, k) in [(0.05, 3.3), (0.8, 2.6), (2.9, 3.1f64)] {
+            let (f0, edge) = (complex(1.0, eta, k), complex(1.0 / 7.0, eta, k));
+            let (found, extinction) = complex_through(f0, edge);
+            assert!(
+                (complex(1.0, found, extinction) - f0).abs() < 1e-6,
+                "{eta} + {k}i"
+            );
+            assert!(
+                (complex(1.0 / 7.0, found, extinction) - edge).abs() < 1e-5,
+                "{eta} + {k}i"
+            );
+        }
+        for f0 in [0.0, 0.04, 0.5, 1.0f64] {
+            for edge in [0.0, 0.5, 1.0] {
+                let (eta, k) = complex_through(f0, edge);
+                assert!(
+                    (complex(1.0, eta, k) - f0).abs() < 2e-4,
+                    "{f0}, {edge}: {eta} + {k}i"
+                );
+            }
         }
     }
 

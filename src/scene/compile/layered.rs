@@ -23,6 +23,10 @@ impl Compiler<'_> {
                     } => Slab::Absorbing(self.tint(absorption)?, self.number(thickness)?),
                     desc::Slab::Transmitting(color) => Slab::Transmitting(self.tint(color)?),
                 },
+                film: match &interface.film {
+                    Some(film) => Some(self.film(film)?),
+                    None => None,
+                },
             });
         }
         let base = match &layered.base {
@@ -34,6 +38,7 @@ impl Compiler<'_> {
                         ior: self.number(&glass.ior)?,
                         relief: self.relief(&glass.rough)?,
                         slab: Slab::Clear,
+                        film: None,
                     });
                     BaseLayer::Open
                 }

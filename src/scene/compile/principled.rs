@@ -162,14 +162,10 @@ impl Compiler<'_> {
             self.note("subsurface scattering is a diffuse base of the same colour");
         }
         let thin_film_thickness = self.number(&sockets.thin_film_thickness)?;
-        if !thin_film_thickness.is(0.0) {
-            if node.layering == desc::Layering::Walks {
-                self.note("a thin film is left out by walks");
-            } else if sockets.transmission_weight != desc::Scalar::Value(0.0)
-                || sockets.metallic != desc::Scalar::Value(0.0)
-            {
-                self.note("a thin film on glass or metal of the node is left out");
-            }
+        if !(node.filmed_metal || thin_film_thickness.is(0.0))
+            && sockets.metallic != desc::Scalar::Value(0.0)
+        {
+            self.note("a thin film on metal is left out, as the node had none before 5.0");
         }
         let sheen_weight = self.number(&sockets.sheen_weight)?;
         self.need_if(Features::DIFFUSERS, !sheen_weight.is(0.0));
@@ -194,6 +190,7 @@ impl Compiler<'_> {
             coat_tint: self.tint(&sockets.coat_tint)?,
             thin_film_thickness,
             thin_film_ior: self.number(&sockets.thin_film_ior)?,
+            filmed_metal: node.filmed_metal,
             sheen_weight,
             sheen_roughness: self.number(&sockets.sheen_roughness)?,
             sheen_tint: self.tint(&sockets.sheen_tint)?,

@@ -1,7 +1,7 @@
 //! Stacks of interfaces before their parameters are looked up.
 
 use super::super::Surface;
-use super::rough::{LEAST_IOR, Reflectance, Roughness, Tangent, to_model_color};
+use super::rough::{LEAST_IOR, Reflectance, Roughness, Tangent, ThinFilm, to_model_color};
 use super::value::{Number, Point, Tint};
 use crate::bsdf::{Closure, Distribution, Frame, Stack, StackLayers};
 use crate::color::Rgb;
@@ -38,6 +38,8 @@ pub struct InterfaceLayer {
     pub relief: Relief,
     /// What the slab absorbs.
     pub slab: Slab,
+    /// What lies on it.
+    pub film: Option<ThinFilm>,
 }
 
 /// Absorption between two surfaces.
@@ -137,7 +139,8 @@ impl Layers {
                 }
                 Slab::Transmitting(color) => color.is_fixed(),
             };
-            slab && interface.ior.is_fixed() && interface.relief.is_fixed()
+            let film = interface.film.is_none_or(ThinFilm::is_fixed);
+            slab && film && interface.ior.is_fixed() && interface.relief.is_fixed()
         }) && self.base.is_fixed()
     }
 
@@ -160,6 +163,7 @@ impl Layers {
                 finish: interface.relief.at::<F>(point),
                 absorption: to_model_color(absorption),
                 thickness,
+                film: interface.film.map(|film| film.at::<F>(point)),
                 ..Interface::new(1.0, Finish::Smooth)
             }
         });

@@ -15,7 +15,7 @@ pub use layers::{BaseLayer, InterfaceLayer, LayeredMaterial, Layers, Relief, Sla
 pub use openpbr::OpenPbr;
 pub use perturbation::{Bump, NormalMap, Perturbation};
 pub use principled::{Layering, Principled3, Principled4, Setup};
-pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, blender_alphas};
+pub use rough::{Facet, Reflectance, RoughMaterial, Roughness, Tangent, ThinFilm, blender_alphas};
 pub use value::{Ground, Number, Point, Tint, VertexColors};
 
 use arrayvec::ArrayVec;

@@ -2,15 +2,16 @@
 
 use super::super::Surface;
 use super::principled::{
-    Layering, Setup, diffuse_facets, fibres, push_plain, push_transparent, reflecting, transmitting,
+    Layering, NONE, Setup, diffuse_facets, fibres, film_seen, push_plain, push_transparent,
+    reflecting, transmitting,
 };
-use super::rough::{LEAST_IOR, edge_tinted, eta, to_model_color};
+use super::rough::{LEAST_IOR, edge_tinted, eta, film, filmed, to_model_color};
 use super::value::{Number, Point, Tint};
 use super::walked::{self, Walked};
 use crate::bsdf::{Bsdf, Closure};
 use crate::color::Rgb;
 use smithwalk_model::layered::Interface;
-use smithwalk_model::{ConductorFresnel, Glass, fresnel};
+use smithwalk_model::{ConductorFresnel, Film, Glass, fresnel};
 
 /// OpenPBR's surface; parameters as in [`crate::description::OpenPbr`].
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +34,9 @@ pub struct OpenPbr {
     pub coat_roughness: Number,
     pub coat_roughness_anisotropy: Number,
     pub coat_ior: Number,
+    pub thin_film_weight: Number,
+    pub thin_film_thickness: Number,
+    pub thin_film_ior: Number,
     pub fuzz_weight: Number,
     pub fuzz_color: Tint,
     pub fuzz_roughness: Number,
@@ -77,16 +81,20 @@ impl OpenPbr {
         let ior = self.specular_ior.at::<F>(point).max(LEAST_IOR);
         let coat_ior = self.coat_ior.at::<F>(point).max(LEAST_IOR);
 
+        let film = self.film::<F>(point);
         let fresnel = scaled(edge_tinted(base, color), strength.min(1.0));
-        let below_air = walked::interface(modulated(ior, 1.0, strength), 1.0, alphas, color);
-        let below_coat =
-            walked::interface(modulated(ior, coat_ior, strength), coat_ior, alphas, color);
+        let fresnel = filmed(fresnel, film);
+        let [below_air, below_coat] = [1.0, coat_ior].map(|above| {
+            let ior = modulated(ior, above, strength);
+            walked::interface(ior, above, alphas, color, film)
+        });
         let through = self.transmission_color.at::<F>(point);
         let through = to_model_color(through.clamp(Rgb::ZERO, Rgb::ONE));
         let glass = Glass {
             eta: eta(below_air.ior, point.front),
             reflection: below_air.reflection,
             transmission: through,
+            film: film_seen(film, below_air.ior, point.front),
         };
         let dull = self.base_diffuse_roughness.share::<F>(point);
         let (fixed, method) = match self.setup.layering {
@@ -109,7 +117,7 @@ impl OpenPbr {
             metal: (
                 metalness,
                 reflecting(alphas, fresnel, method),
-                walked::metal(alphas, fresnel),
+                walked::metal(alphas, fresnel, coat_ior),
             ),
             glass: (
                 (1.0 - metalness) * transmission,
@@ -131,6 +139,14 @@ impl OpenPbr {
             .tangent
             .frame::<F>(Number::Constant(0.0), point, surface);
         walked.add(bsdf, surface, frame, diffuse_facets(base, dull));
+    }
+
+    /// The film on the base.
+    fn film<const F: u32>(&self, point: &Point<'_>) -> Option<Film<f32>> {
+        let cover = self.thin_film_weight.share::<F>(point);
+        let nanometres = 1000.0 * self.thin_film_thickness.at::<F>(point);
+        let thin = film(self.thin_film_ior.at::<F>(point), nanometres, cover);
+        (cover > NONE && thin.thickness > NONE).then_some(thin)
     }
 
     /// The fuzz, and the share of light that it leaves to what lies below.

@@ -12,7 +12,7 @@ pub use blender_3::Principled3;
 use glam::Vec3;
 
 use super::super::Surface;
-use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, film, to_model_color};
+use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, film, filmed, to_model_color};
 use super::value::{Number, Point, Tint};
 use super::walked::{self, FixedStacks, Walked};
 use crate::bsdf::{
@@ -22,7 +22,7 @@ use crate::bsdf::{
 use crate::color::{Rgb, luminance};
 use smithwalk_model::layered::Interface as LayerInterface;
 use smithwalk_model::{
-    Conductor, ConductorFresnel, Diffuse, Estimator, Glass, Refraction, fresnel,
+    Conductor, ConductorFresnel, Diffuse, Estimator, Film, Glass, Refraction, Side, fresnel,
 };
 
 /// What is not a socket of the node.
@@ -84,6 +84,8 @@ pub struct Principled4 {
     pub sheen_tint: Tint,
     pub thin_film_thickness: Number,
     pub thin_film_ior: Number,
+    /// Whether the film lies on metal too.
+    pub filmed_metal: bool,
     pub emission_color: Tint,
     pub emission_strength: Number,
 }
@@ -258,10 +260,12 @@ impl Principled4 {
         let alphas = stretched(roughness, self.anisotropic.share::<F>(point));
         let frame = self.frame::<F>(point, surface);
         let tint = self.specular_tint.at::<F>(point).max(Rgb::ZERO);
+        let film = self.film::<F>(point);
 
         let metallic = self.metallic.share::<F>(point);
         if metallic > NONE {
             let fresnel = edge_tinted(clamped, tint.min(Rgb::ONE));
+            let fresnel = filmed(fresnel, film.filter(|_| self.filmed_metal));
             let closure = reflecting(alphas, fresnel, method);
             stack.push(closure, frame, weight * metallic, clamped);
             weight *= 1.0 - metallic;
@@ -283,6 +287,7 @@ impl Principled4 {
                 eta,
                 reflection: to_model_color(reflection),
                 transmission: to_model_color(clamped.map(f32::sqrt)),
+                film: film_seen(film, ior, point.front),
             };
             let method = self.setup.glass.unwrap_or(method);
             let closure = transmitting([alpha; 2], glass, point.cos, method);
@@ -294,10 +299,9 @@ impl Principled4 {
         let (f0, eta) = leveled(ior, level);
         if eta != 1.0 && weight.max_element() > 0.0 {
             let f0 = (tint * f0).clamp(Rgb::ZERO, Rgb::ONE);
-            let thickness = self.thin_film_thickness.at::<F>(point);
-            let (fresnel, own) = if thickness > NONE {
+            let (fresnel, own) = if let Some(film) = film {
                 let fresnel = ConductorFresnel::Film {
-                    film: film(self.thin_film_ior.at::<F>(point), thickness),
+                    film,
                     eta: to_model_color(Rgb::splat(eta)),
                     k: to_model_color(Rgb::ZERO),
                 };
@@ -328,6 +332,12 @@ impl Principled4 {
             Closure::Lambert(Lambert { albedo: base })
         };
         stack.push_plain(closure, weight, base);
+    }
+
+    /// The film below the coat.
+    fn film<const F: u32>(&self, point: &Point<'_>) -> Option<Film<f32>> {
+        let thickness = self.thin_film_thickness.at::<F>(point);
+        (thickness > NONE).then(|| film(self.thin_film_ior.at::<F>(point), thickness, 1.0))
     }
 
     /// The sheen, and the share of light that it leaves to what lies below.
@@ -363,20 +373,24 @@ impl Principled4 {
         let (_, leveled) = leveled(ior, self.specular_ior_level.at::<F>(point).max(0.0));
 
         let coat_roughness = self.coat_roughness.share::<F>(point);
+        let coat_ior = self.coat_ior.at::<F>(point).max(1.0);
+        let film = self.film::<F>(point);
         let coat = walked::coat(
-            self.coat_ior.at::<F>(point).max(1.0),
+            coat_ior,
             [coat_roughness * coat_roughness; 2],
             self.coat_tint.at::<F>(point),
         );
         let fresnel = edge_tinted(base, tint.min(Rgb::ONE));
+        let fresnel = filmed(fresnel, film.filter(|_| self.filmed_metal));
         let through = LayerInterface {
             transmission: to_model_color(base.map(f32::sqrt)),
-            ..walked::interface(ior, 1.0, [roughness * roughness; 2], tint)
+            ..walked::interface(ior, 1.0, [roughness * roughness; 2], tint, film)
         };
         let glass = Glass {
             eta: eta(ior, point.front),
             reflection: through.reflection,
             transmission: through.transmission,
+            film: film_seen(film, ior, point.front),
         };
         let alpha = roughness * roughness;
         let method = self.setup.glass.unwrap_or(self.setup.reflecting);
@@ -388,7 +402,7 @@ impl Principled4 {
             metal: (
                 metallic,
                 reflecting(alphas, fresnel, self.setup.reflecting),
-                walked::metal(alphas, fresnel),
+                walked::metal(alphas, fresnel, coat_ior),
             ),
             glass: (
                 (1.0 - metallic) * transmission,
@@ -397,7 +411,7 @@ impl Principled4 {
             ),
             plastic: (
                 plastic,
-                [walked::interface(leveled, 1.0, alphas, tint); 2],
+                [walked::interface(leveled, 1.0, alphas, tint, film); 2],
                 walked::diffuse(base, dull),
             ),
             fixed,
@@ -514,9 +528,16 @@ fn leveled(ior: f32, level: f32) -> (f32, f32) {
 
 /// A smooth interface with the colours of glass at this angle.
 fn smooth_glass(glass: Glass<f32>, cos: f32) -> Closure {
+    let cos = cos.min(1.0);
     Closure::Interface(Interface {
         eta: glass.eta,
-        reflected: Some(Rgb::from(glass.reflected(cos.min(1.0), glass.eta).0)),
-        refracted: Rgb::from(glass.transmitted().0),
+        reflected: Some(Rgb::from(glass.reflected(Side::Above, cos).0)),
+        refracted: Rgb::from(glass.transmitted(Side::Above, cos).0),
     })
+}
+
+/// A film on glass of this index as the viewer sees it, in front of the glass or from
+/// inside.
+pub(super) fn film_seen(film: Option<Film<f32>>, ior: f32, front: bool) -> Option<Film<f32>> {
+    film.map(|film| if front { film } else { film.inverted(ior) })
 }

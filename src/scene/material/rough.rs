@@ -96,10 +96,8 @@ pub enum Reflectance {
     },
     /// A thin film on a metal of complex indices.
     Film {
-        /// The film's index of refraction.
-        ior: Number,
-        /// Its thickness, nm.
-        thickness: Number,
+        /// The film.
+        film: ThinFilm,
         /// η.
         eta: Tint,
         /// k.
@@ -115,12 +113,7 @@ impl Reflectance {
             Self::Complex { eta: a, k: b }
             | Self::F82 { f0: a, f82: b }
             | Self::EdgeTint { f0: a, tint: b } => a.is_fixed() && b.is_fixed(),
-            Self::Film {
-                ior,
-                thickness,
-                eta,
-                k,
-            } => ior.is_fixed() && thickness.is_fixed() && eta.is_fixed() && k.is_fixed(),
+            Self::Film { film, eta, k } => film.is_fixed() && eta.is_fixed() && k.is_fixed(),
         }
     }
 
@@ -139,13 +132,8 @@ impl Reflectance {
                 f82: at(f82),
             },
             Self::EdgeTint { f0, tint } => edge_tinted(f0.at::<F>(point), tint.at::<F>(point)),
-            Self::Film {
-                ior,
-                thickness,
-                eta,
-                k,
-            } => ConductorFresnel::Film {
-                film: film(ior.at::<F>(point), thickness.at::<F>(point)),
+            Self::Film { film, eta, k } => ConductorFresnel::Film {
+                film: film.at::<F>(point),
                 eta: at(eta),
                 k: at(k),
             },
@@ -153,11 +141,52 @@ impl Reflectance {
     }
 }
 
-/// A film of this index and this thickness in nm, as textures may say it.
-pub(super) fn film(ior: f32, thickness: f32) -> Film<f32> {
+/// A thin film.
+#[derive(Clone, Copy, Debug)]
+pub struct ThinFilm {
+    /// Index of refraction, absolute.
+    pub ior: Number,
+    /// Thickness, nm.
+    pub thickness: Number,
+}
+
+impl ThinFilm {
+    pub(super) fn is_fixed(self) -> bool {
+        self.ior.is_fixed() && self.thickness.is_fixed()
+    }
+
+    pub(super) fn at<const F: u32>(self, point: &Point<'_>) -> Film<f32> {
+        film(self.ior.at::<F>(point), self.thickness.at::<F>(point), 1.0)
+    }
+}
+
+/// A film of this index and this thickness in nm, as textures may say it, on this share
+/// of the facets.
+pub(super) fn film(ior: f32, thickness: f32, cover: f32) -> Film<f32> {
     Film {
         ior: ior.max(LEAST_IOR),
         thickness: thickness.clamp(0.0, MOST_NANOMETRES),
+        cover,
+    }
+}
+
+/// A metal that reflects as `fresnel`, an edge-tinted one, below a film: of the complex
+/// indices that agree with it at normal incidence and at cosθ = 1/7.
+pub(super) fn filmed(
+    fresnel: ConductorFresnel<f32>,
+    film: Option<Film<f32>>,
+) -> ConductorFresnel<f32> {
+    match (fresnel, film) {
+        (ConductorFresnel::F82 { f0, f82 }, Some(film)) => {
+            let through = |c: usize| model::fresnel::complex_through(f0.0[c], f82.0[c]);
+            let indices: [(f32, f32); 3] = std::array::from_fn(through);
+            ConductorFresnel::Film {
+                film,
+                eta: model::Rgb(indices.map(|(eta, _)| eta)),
+                k: model::Rgb(indices.map(|(_, k)| k)),
+            }
+        }
+        (plain, _) => plain,
     }
 }
 

@@ -8,8 +8,8 @@ use super::principled::{LEAST_CHANCE, NONE};
 use super::rough::to_model_color;
 use crate::bsdf::{Bsdf, Closure, Distribution, Frame, Stack, StackLayers, WeightedClosure};
 use crate::color::Rgb;
-use smithwalk_model::ConductorFresnel;
 use smithwalk_model::layered::{Base, Finish, Interface, Layered};
+use smithwalk_model::{ConductorFresnel, Film};
 
 /// The stacks of a node that is everywhere the same, made when they are first met:
 /// without a coat, then with one, in the order of [`Kind`].
@@ -131,23 +131,39 @@ pub(super) fn coat(ior: f32, alphas: [f32; 2], tint: Rgb) -> Interface<f32> {
 /// Of a tint whose logarithm is taken.
 const LEAST_TINT: Rgb = Rgb::splat(1e-30);
 
-/// An interface of this reflectance at normal incidence over that without colours.
-pub(super) fn interface(ior: f32, above: f32, alphas: [f32; 2], tint: Rgb) -> Interface<f32> {
+/// An interface of this reflectance at normal incidence over that without colours, or
+/// below a film.
+pub(super) fn interface(
+    ior: f32,
+    above: f32,
+    alphas: [f32; 2],
+    tint: Rgb,
+    film: Option<Film<f32>>,
+) -> Interface<f32> {
     let f0 = smithwalk_model::fresnel::normal_reflectance(ior / above);
     let most = if f0 > 0.0 { (1.0 / f0).max(1.0) } else { 1.0 };
     // Rounding may bring the product above 1.
     let most = (most * (1.0 - f32::EPSILON)).max(1.0);
     Interface {
         reflection: to_model_color(tint.clamp(Rgb::ZERO, Rgb::splat(most))),
+        film,
         ..Interface::new(ior, finish(Distribution::Ggx, alphas))
     }
 }
 
-/// The metal below a coat.
-pub(super) fn metal(alphas: [f32; 2], fresnel: ConductorFresnel<f32>) -> Base<f32> {
+/// The metal below a coat of index `above`, which changes nothing of what it reflects.
+pub(super) fn metal(alphas: [f32; 2], fresnel: ConductorFresnel<f32>, above: f32) -> Base<f32> {
     Base::Conductor {
         finish: finish(Distribution::Ggx, alphas),
-        fresnel,
+        fresnel: match fresnel {
+            // Relative to the coat, not to air.
+            ConductorFresnel::Film { film, eta, k } => ConductorFresnel::Film {
+                film,
+                eta: eta * above,
+                k: k * above,
+            },
+            colored => colored,
+        },
     }
 }
 

@@ -55,6 +55,26 @@ pub(super) fn refracted<F: Real, N: Ndf<Scalar = F>>(
     })
 }
 
+/// The cosine of `at` to the facet that reflects it into `o`, and D(m), sr⁻¹, of its normal:
+/// the density of `o` is F D / 4σ. `None` if there is none.
+#[inline]
+pub(super) fn reflected<F: Real, N: Ndf<Scalar = F>>(
+    ndf: &N,
+    at: At<F>,
+    o: Vector3<F>,
+) -> Option<(F, F)> {
+    let h = at.w + o;
+    let length = h.length();
+    if h.z <= F::zero() || length == F::zero() || at.sigma == F::zero() {
+        return None;
+    }
+    // |w + o| = 2 w·m, which rounding at grazing angles can't make zero
+    // or negative, as it can the scalar product.
+    let cos = (F::of(0.5) * length).min(F::one());
+    let m = h * length.recip();
+    Some((cos, ndf.density(m)))
+}
+
 impl<F: Real> Facets for Dielectric<F> {
     type Scalar = F;
 
@@ -101,16 +121,10 @@ impl<F: Real> Facets for Dielectric<F> {
             };
             fresnel::transmittance(facet.cos, facet.cos_o, eta) * facet.visible * facet.jacobian
         } else {
-            let h = at.w + o;
-            let length = h.length();
-            if h.z <= F::zero() || length == F::zero() || at.sigma == F::zero() {
+            let Some((cos, normals)) = reflected(ndf, at, o) else {
                 return Phase::none();
-            }
-            // |w + o| = 2 w·m, which rounding at grazing angles can't make zero
-            // or negative, as it can the scalar product.
-            let cos = (F::of(0.5) * length).min(F::one());
-            let m = h * length.recip();
-            fresnel::dielectric(cos, eta).0 * ndf.density(m) / (F::of(4.0) * at.sigma)
+            };
+            fresnel::dielectric(cos, eta).0 * normals / (F::of(4.0) * at.sigma)
         };
         Phase {
             density,

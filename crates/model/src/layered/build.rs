@@ -32,6 +32,8 @@ pub struct Interface<F> {
     pub reflection: Rgb<F>,
     /// The factor on what it lets through, in either direction.
     pub transmission: Rgb<F>,
+    /// A thin film on it, of absolute index; then `reflection` has no say.
+    pub film: Option<Film<F>>,
 }
 
 impl<F: Real> Interface<F> {
@@ -44,6 +46,7 @@ impl<F: Real> Interface<F> {
             thickness: F::one(),
             reflection: Rgb::white(),
             transmission: Rgb::white(),
+            film: None,
         }
     }
 }
@@ -182,6 +185,10 @@ impl<F: Real> Interface<F> {
             eta: ior / above,
             reflection: self.reflection,
             transmission: self.transmission,
+            film: match self.film {
+                Some(film) => Some(film_under(film, above, number)?),
+                None => None,
+            },
         };
         check(number, Quantity::Ior, facets.eta, facets.eta > F::zero())?;
         let (zero, one) = (F::zero(), F::one());
@@ -196,9 +203,12 @@ impl<F: Real> Interface<F> {
         if facets.invisible().is_some() {
             facets.eta = one;
             facets.reflection = Rgb::white();
+            facets.film = None;
             finish = Finish::Smooth;
         }
-        let colored = facets.reflection != Rgb::white() || facets.transmission != Rgb::white();
+        let colored = facets.reflection != Rgb::white()
+            || facets.transmission != Rgb::white()
+            || facets.film.is_some();
         let white = Dielectric {
             eta: facets.eta,
             tint: Rgb::white(),
@@ -337,19 +347,35 @@ fn under<F: Real>(
         }
         ConductorFresnel::Film { film, eta, k } => {
             complex_index(eta, k)?;
-            check(None, Quantity::Ior, film.ior, film.ior > F::zero())?;
-            let thickness = film.thickness;
-            check(None, Quantity::Thickness, thickness, thickness >= F::zero())?;
             return Ok(ConductorFresnel::Film {
-                // The way through the film keeps its length in wavelengths.
-                film: Film {
-                    ior: film.ior / above,
-                    thickness: thickness * above,
-                },
+                film: film_under(film, above, None)?,
                 eta: eta * above.recip(),
                 k: k * above.recip(),
             });
         }
     }
     Ok(fresnel)
+}
+
+/// A film of absolute index under a medium of index `above`.
+fn film_under<F: Real>(
+    film: Film<F>,
+    above: F,
+    interface: Option<usize>,
+) -> Result<Film<F>, LayeredError> {
+    let (zero, one) = (F::zero(), F::one());
+    check(interface, Quantity::Ior, film.ior, film.ior > zero)?;
+    check(
+        interface,
+        Quantity::Thickness,
+        film.thickness,
+        film.thickness >= zero,
+    )?;
+    check(
+        interface,
+        Quantity::Share,
+        film.cover,
+        film.cover >= zero && film.cover <= one,
+    )?;
+    Ok(film.inverted(above))
 }

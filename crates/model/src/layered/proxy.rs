@@ -195,7 +195,8 @@ impl<F: Real> Layered<F> {
                         Side::Above => eta,
                         Side::Below => eta.recip(),
                     };
-                    let (reflectance, cos_t) = fresnel::dielectric(cos, eta);
+                    let (plain, cos_t) = fresnel::dielectric(cos, eta);
+                    let reflectance = surface.filmed(entered, cos).unwrap_or(plain);
                     let lobe = mirror(part * reflectance, entered, from, outside, tilted);
                     add(&mut lobes, lobe);
                     let through = ior * eta;

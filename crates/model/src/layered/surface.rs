@@ -172,6 +172,19 @@ impl<F: Real> Surface<F> {
         }
     }
 
+    /// The mean reflectance of an interface's film at this cosine of incidence.
+    pub fn filmed(&self, side: Side, cos: F) -> Option<F> {
+        match self {
+            Self::Colored(facets)
+            | Self::GgxGlass(Microsurface { facets, .. })
+            | Self::BeckmannGlass(Microsurface { facets, .. }) => {
+                let film = facets.film.as_ref()?;
+                Some(facets.filmed(film, side, cos).1)
+            }
+            _ => None,
+        }
+    }
+
     /// The facets' reflectance at this cosine of incidence, of metals.
     pub fn metal(&self, cos: F) -> Option<Rgb<F>> {
         match self {

@@ -191,8 +191,10 @@ impl<F: Real> Surface<F> {
             }
             Surface::Colored(facets) if trail.arrivals.len() == 1 => {
                 let side = side_of(arrival.w);
-                let (share, direction) = let_through(facets.eta, side, localized(side, arrival.w))?;
-                Some(smooth(localized(side, direction), facets.transmitted() * share))
+                let w = localized(side, arrival.w);
+                let (share, direction) = let_through(facets.eta, side, w)?;
+                let color = facets.transmitted(side, w.z);
+                Some(smooth(localized(side, direction), color * share))
             }
             Surface::Interface(facets) => {
                 let bounce = bounce_smooth(facets, arrival.w, rng);

@@ -178,12 +178,13 @@ impl Principled3 {
         let tinted = Rgb::splat(self.specular_tint.share::<F>(point));
         let through = LayerInterface {
             transmission: to_model_color(base),
-            ..walked::interface(ior, 1.0, [alpha; 2], mix(Rgb::ONE, base, tinted))
+            ..walked::interface(ior, 1.0, [alpha; 2], mix(Rgb::ONE, base, tinted), None)
         };
         let glass = Glass {
             eta: eta(ior, point.front),
             reflection: through.reflection,
             transmission: through.transmission,
+            film: None,
         };
         let method = self.setup.glass.unwrap_or(self.setup.reflecting);
         let coat_roughness = self.clearcoat_roughness.share::<F>(point);
@@ -198,7 +199,7 @@ impl Principled3 {
             metal: (
                 metallic,
                 reflecting(alphas, fresnel, self.setup.reflecting),
-                walked::metal(alphas, fresnel),
+                walked::metal(alphas, fresnel, 1.5),
             ),
             glass: (
                 (1.0 - metallic) * transmission,
@@ -207,7 +208,7 @@ impl Principled3 {
             ),
             plastic: (
                 (1.0 - metallic) * (1.0 - transmission),
-                [walked::interface(specular, 1.0, alphas, hue); 2],
+                [walked::interface(specular, 1.0, alphas, hue, None); 2],
                 walked::diffuse(self.albedo::<F>(point), 0.0),
             ),
             fixed,
@@ -250,6 +251,7 @@ impl Principled3 {
                 eta,
                 reflection: to_model_color(tint),
                 transmission: to_model_color(base.min(Rgb::ONE)),
+                film: None,
             };
             stack.push_plain(rough([alpha; 2], glass, method), weight, Rgb::ONE);
             return;
