@@ -1,6 +1,8 @@
 //! Surfaces made of layers.
 
-use super::material::{Factor, Material, MaterialRef, ThinFilm};
+use super::conductor::ThinFilm;
+use super::factor::Factor;
+use super::material::{Material, MaterialRef};
 use super::relief::{Bump, NormalMap, Relief};
 use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};

@@ -1,16 +1,17 @@
 //! Materials.
 
+use super::conductor::Conductor;
+use super::factor::Factor;
 use super::filled::Filled;
 use super::layered::Layered;
 use super::openpbr::OpenPbr;
 use super::principled::{Principled, Version};
 use super::relief::{Bump, NormalMap, Relief};
-use super::rough::{Distribution, Rough, Roughness, Scattering, Tangent, raw_rough, roughness_of};
+use super::rough::{Distribution, Rough, Scattering, Tangent, raw_rough, roughness_of};
 use super::validate::{At, Check, Range};
-use super::value::{Clash, Color, Scalar, visit_numbers};
+use super::value::{Clash, Color, Scalar};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, Visitor, value::MapAccessDeserializer};
-use serde_yaml::with::singleton_map_recursive;
 use std::fmt;
 
 /// How a surface scatters, passes or emits light.
@@ -50,93 +51,6 @@ pub enum Material {
     /// OpenPBR's surface.
     #[serde(rename = "openpbr")]
     OpenPbr(Box<OpenPbr>),
-}
-
-/// A rough metal.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "RawConductor")]
-pub struct Conductor {
-    /// The microsurface.
-    pub rough: Rough,
-    /// The reflectance of every facet.
-    pub reflectance: Reflectance,
-}
-
-/// The Fresnel reflectance of a metal's facets.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Reflectance {
-    /// The same at all angles.
-    Color(Color),
-    /// Measured complex indices of refraction.
-    Metal(Metal),
-    /// A complex index of refraction per channel, η + ik.
-    Complex {
-        /// The real part.
-        eta: Color,
-        /// The imaginary part, positive for absorption.
-        k: Color,
-    },
-    /// Schlick's approximation.
-    Schlick {
-        /// At normal incidence.
-        f0: Color,
-    },
-    /// Schlick's approximation corrected near 82°.
-    F82 {
-        /// At normal incidence.
-        f0: Color,
-        /// The reflectance at cos θ = 1/7.
-        f82: Color,
-    },
-    /// Complex indices below a thin film.
-    Film {
-        /// The film.
-        film: ThinFilm,
-        /// The metal: [`Self::Metal`] or [`Self::Complex`].
-        below: Box<Reflectance>,
-    },
-    /// The same, as Blender's nodes say it.
-    EdgeTint {
-        /// At normal incidence.
-        f0: Color,
-        /// The factor on Schlick's value at cos θ = 1/7.
-        tint: Color,
-    },
-}
-
-/// A film whose two reflections interfere.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ThinFilm {
-    /// Index of refraction, absolute.
-    #[serde(default = "water")]
-    pub ior: Scalar,
-    /// Thickness in nm.
-    pub thickness: Scalar,
-}
-
-impl ThinFilm {
-    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
-        check.scalar(&self.ior, Range::Positive, at.key("ior"));
-        check.scalar(&self.thickness, Range::NonNegative, at.key("thickness"));
-    }
-}
-
-fn water() -> Scalar {
-    Scalar::Value(1.33)
-}
-
-/// A metal with known indices of refraction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs)] // the names say it all
-pub enum Metal {
-    Gold,
-    Silver,
-    Copper,
-    Aluminium,
-    Iron,
-    Chromium,
 }
 
 /// Rough glass.
@@ -319,108 +233,6 @@ pub struct Sum {
     pub b: MaterialRef,
 }
 
-/// The share of the second material of a mix.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Factor {
-    /// A number or a texture.
-    Share(Scalar),
-    /// The reflectance of a smooth interface towards the viewer.
-    Fresnel {
-        /// The index of refraction inside over the one outside.
-        ior: Scalar,
-    },
-    /// How far the surface is turned away from the viewer.
-    Facing {
-        /// 0 to 1; at one half, 1 − cosθ.
-        blend: Scalar,
-    },
-    /// 1 seen from inside.
-    Backfacing,
-    /// 1 for camera rays.
-    CameraRay,
-}
-
-impl Default for Factor {
-    fn default() -> Self {
-        Self::Share(Scalar::Value(0.5))
-    }
-}
-
-impl<'de> Deserialize<'de> for Factor {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(rename_all = "snake_case")]
-        enum ByView {
-            Fresnel(Fresnel),
-            Facing(Facing),
-            Backfacing,
-            CameraRay,
-        }
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Fresnel {
-            #[serde(default = "ior")]
-            ior: Scalar,
-        }
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Facing {
-            #[serde(default = "half")]
-            blend: Scalar,
-        }
-        fn ior() -> Scalar {
-            Scalar::Value(1.45)
-        }
-        fn half() -> Scalar {
-            Scalar::Value(0.5)
-        }
-
-        impl From<ByView> for Factor {
-            fn from(by_view: ByView) -> Self {
-                match by_view {
-                    ByView::Fresnel(Fresnel { ior }) => Self::Fresnel { ior },
-                    ByView::Facing(Facing { blend }) => Self::Facing { blend },
-                    ByView::Backfacing => Self::Backfacing,
-                    ByView::CameraRay => Self::CameraRay,
-                }
-            }
-        }
-
-        struct FactorVisitor;
-
-        impl<'de> Visitor<'de> for FactorVisitor {
-            type Value = Factor;
-
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str(
-                    "a number, {texture: NAME}, {fresnel: {ior: 1.45}}, {facing: {blend: 0.5}}, backfacing or camera_ray",
-                )
-            }
-
-            visit_numbers!(Factor, n => Factor::Share(Scalar::Value(n as f32)));
-
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Factor, E> {
-                ByView::deserialize(de::value::StrDeserializer::new(name)).map(Factor::from)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Factor, A::Error> {
-                let value = serde_yaml::Value::deserialize(MapAccessDeserializer::new(map))?;
-                let textured = value.get("texture").is_some() || value.get("channel").is_some();
-                let read = |value| {
-                    if textured {
-                        Scalar::deserialize(value).map(Factor::Share)
-                    } else {
-                        singleton_map_recursive::deserialize::<ByView, _>(value).map(Factor::from)
-                    }
-                };
-                read(value).map_err(de::Error::custom)
-            }
-        }
-
-        deserializer.deserialize_any(FactorVisitor)
-    }
-}
-
 /// A material by name, or written in place.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialRef {
@@ -462,85 +274,12 @@ impl<'de> Deserialize<'de> for MaterialRef {
 }
 
 raw_rough! {
-    RawConductor {
-        color: Option<Color>,
-        metal: Option<Metal>,
-        eta: Option<Color>,
-        k: Option<Color>,
-        f0: Option<Color>,
-        f82: Option<Color>,
-        edge_tint: Option<Color>,
-        thin_film: Option<ThinFilm>,
-    }
     RawDielectric {
         ior: Option<Scalar>,
         color: Option<Color>,
     }
     RawRoughDiffuse {
         color: Option<Color>,
-    }
-}
-
-impl TryFrom<RawConductor> for Conductor {
-    type Error = Clash;
-
-    fn try_from(mut raw: RawConductor) -> Result<Self, Clash> {
-        let rough = raw.rough()?;
-        let given: Vec<&str> = [
-            ("color", raw.color.is_some()),
-            ("metal", raw.metal.is_some()),
-            ("eta", raw.eta.is_some() || raw.k.is_some()),
-            (
-                "f0",
-                raw.f0.is_some() || raw.f82.is_some() || raw.edge_tint.is_some(),
-            ),
-        ]
-        .into_iter()
-        .filter_map(|(key, given)| given.then_some(key))
-        .collect();
-        if let [first, second, ..] = given[..] {
-            return Err(Clash::new(
-                second,
-                format!(
-                    "`{first}` and `{second}` exclude each other: a conductor takes one of `color`, `metal`, `eta` and `k`, `f0`, `f0` and `f82`, or `f0` and `edge_tint`"
-                ),
-            ));
-        }
-        if raw.f82.is_some() && raw.edge_tint.is_some() {
-            return Err(Clash::between("f82", "edge_tint"));
-        }
-        if raw.edge_tint.is_some() && raw.f0.is_none() {
-            return Err(Clash::new("edge_tint", "`edge_tint` needs `f0`"));
-        }
-        let reflectance = match (raw.metal, raw.eta, raw.k, raw.f0, raw.f82) {
-            (Some(metal), ..) => Reflectance::Metal(metal),
-            (_, Some(eta), Some(k), ..) => Reflectance::Complex { eta, k },
-            (_, Some(_), None, ..) => return Err(Clash::new("eta", "`eta` needs `k`")),
-            (_, None, Some(_), ..) => return Err(Clash::new("k", "`k` needs `eta`")),
-            (.., Some(f0), Some(f82)) => Reflectance::F82 { f0, f82 },
-            (.., Some(f0), None) => match raw.edge_tint {
-                Some(tint) => Reflectance::EdgeTint { f0, tint },
-                None => Reflectance::Schlick { f0 },
-            },
-            (.., None, Some(_)) => return Err(Clash::new("f82", "`f82` needs `f0`")),
-            (.., None, None) => Reflectance::Color(raw.color.unwrap_or(Color::WHITE)),
-        };
-        let reflectance = match (raw.thin_film, reflectance) {
-            (None, reflectance) => reflectance,
-            (Some(film), below @ (Reflectance::Metal(_) | Reflectance::Complex { .. })) => {
-                Reflectance::Film {
-                    film,
-                    below: Box::new(below),
-                }
-            }
-            _ => {
-                return Err(Clash::new(
-                    "thin_film",
-                    "`thin_film` needs `metal`, or `eta` and `k`: a film on a colour has no phase",
-                ));
-            }
-        };
-        Ok(Self { rough, reflectance })
     }
 }
 
@@ -612,17 +351,7 @@ impl Material {
             }
             Self::Mix(mix) => {
                 let at = at.key("mix");
-                let factor = at.key("factor");
-                match &mix.factor {
-                    Factor::Share(share) => check.scalar(share, Range::UNIT, factor),
-                    Factor::Fresnel { ior } => {
-                        check.scalar(ior, Range::Positive, factor.key("fresnel").key("ior"));
-                    }
-                    Factor::Facing { blend } => {
-                        check.scalar(blend, Range::UNIT, factor.key("facing").key("blend"));
-                    }
-                    Factor::Backfacing | Factor::CameraRay => {}
-                }
+                mix.factor.check(check, &at.key("factor"));
                 mix.a.check_part(check, at.key("a"));
                 mix.b.check_part(check, at.key("b"));
             }
@@ -691,72 +420,10 @@ impl MaterialRef {
     }
 }
 
-impl Conductor {
-    fn check(&self, check: &mut Check<'_, '_>, at: At) {
-        self.rough.check(check, &at);
-        self.reflectance.check(check, &at);
-    }
-}
-
-impl Reflectance {
-    fn check(&self, check: &mut Check<'_, '_>, at: &At) {
-        match self {
-            Self::Film { film, below } => {
-                film.check(check, &at.key("thin_film"));
-                below.check(check, at);
-            }
-            Reflectance::Color(color) => check.color(color, Range::UNIT, at.key("color")),
-            Reflectance::Metal(_) => {}
-            Reflectance::Complex { eta, k } => {
-                check.color(eta, Range::Positive, at.key("eta"));
-                check.color(k, Range::NonNegative, at.key("k"));
-            }
-            Reflectance::Schlick { f0 } => check.color(f0, Range::UNIT, at.key("f0")),
-            Reflectance::F82 { f0, f82 } => {
-                check.color(f0, Range::UNIT, at.key("f0"));
-                check.color(f82, Range::UNIT, at.key("f82"));
-            }
-            Reflectance::EdgeTint { f0, tint } => {
-                check.color(f0, Range::UNIT, at.key("f0"));
-                check.color(tint, Range::UNIT, at.key("edge_tint"));
-            }
-        }
-    }
-}
-
 impl Dielectric {
     fn check(&self, check: &mut Check<'_, '_>, at: At) {
         self.rough.check(check, &at);
         check.scalar(&self.ior, Range::Positive, at.key("ior"));
         check.color(&self.color, Range::UNIT, at.key("color"));
-    }
-}
-
-impl Rough {
-    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
-        match &self.roughness {
-            Roughness::Alpha(alpha) => check.scalar(alpha, Range::NonNegative, at.key("alpha")),
-            Roughness::AlphaXy { x, y } => {
-                check.scalar(x, Range::NonNegative, at.key("alpha_x"));
-                check.scalar(y, Range::NonNegative, at.key("alpha_y"));
-                if let (Scalar::Value(x), Scalar::Value(y)) = (x, y) {
-                    if (*x == 0.0) != (*y == 0.0) {
-                        check.report(
-                            at.key("alpha_y"),
-                            "expected `alpha_x` and `alpha_y` both 0 or both above 0".to_owned(),
-                        );
-                    }
-                }
-            }
-            Roughness::Blender {
-                roughness,
-                anisotropy,
-            } => {
-                check.scalar(roughness, Range::UNIT, at.key("roughness"));
-                check.scalar(anisotropy, Range::Within(-1.0, 1.0), at.key("anisotropy"));
-            }
-        }
-        check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
-        check.relief(Relief::of(&self.normal, &self.bump), at);
     }
 }

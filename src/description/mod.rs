@@ -5,7 +5,9 @@
 
 mod animation;
 mod camera;
+mod conductor;
 mod document;
+mod factor;
 mod filled;
 mod layered;
 mod light;
@@ -30,13 +32,15 @@ pub use animation::{Animation, Changes, Frame};
 pub use camera::{
     Aperture, Camera, DepthOfField, Opening, Orthographic, Perspective, Projection, SensorFit,
 };
+pub use conductor::{Conductor, Metal, Reflectance, ThinFilm};
+pub use factor::Factor;
 pub use filled::{Filled, Interior};
 pub(crate) use layered::fits;
 pub use layered::{Interface, Layered, Slab};
 pub use light::{AreaShape, Light, LightKind};
 pub use material::{
-    Colored, Conductor, Dielectric, Diffuse, Emission, Factor, Material, MaterialRef, Metal, Mix,
-    Reflectance, RoughDiffuse, Sheen, Sum, ThinFilm, Translucent, Velvet,
+    Colored, Dielectric, Diffuse, Emission, Material, MaterialRef, Mix, RoughDiffuse, Sheen, Sum,
+    Translucent, Velvet,
 };
 pub use openpbr::OpenPbr;
 pub use principled::{Layering, Principled, Principled3, Principled4, Sockets, Version};

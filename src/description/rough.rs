@@ -1,6 +1,7 @@
 //! The keys that all rough materials share.
 
-use super::relief::{Bump, NormalMap};
+use super::relief::{Bump, NormalMap, Relief};
+use super::validate::{At, Check, Range};
 use super::value::{Clash, Scalar};
 pub use crate::bsdf::Distribution;
 use serde::Deserialize;
@@ -177,3 +178,32 @@ fn roughness(
 }
 
 pub(super) use raw_rough;
+
+impl Rough {
+    pub(super) fn check(&self, check: &mut Check<'_, '_>, at: &At) {
+        match &self.roughness {
+            Roughness::Alpha(alpha) => check.scalar(alpha, Range::NonNegative, at.key("alpha")),
+            Roughness::AlphaXy { x, y } => {
+                check.scalar(x, Range::NonNegative, at.key("alpha_x"));
+                check.scalar(y, Range::NonNegative, at.key("alpha_y"));
+                if let (Scalar::Value(x), Scalar::Value(y)) = (x, y) {
+                    if (*x == 0.0) != (*y == 0.0) {
+                        check.report(
+                            at.key("alpha_y"),
+                            "expected `alpha_x` and `alpha_y` both 0 or both above 0".to_owned(),
+                        );
+                    }
+                }
+            }
+            Roughness::Blender {
+                roughness,
+                anisotropy,
+            } => {
+                check.scalar(roughness, Range::UNIT, at.key("roughness"));
+                check.scalar(anisotropy, Range::Within(-1.0, 1.0), at.key("anisotropy"));
+            }
+        }
+        check.scalar(&self.rotation, Range::Within(-1.0, 1.0), at.key("rotation"));
+        check.relief(Relief::of(&self.normal, &self.bump), at);
+    }
+}

@@ -2,16 +2,16 @@
 
 use super::super::Surface;
 use super::principled::{
-    Layering, NONE, Setup, diffuse_facets, fibres, film_seen, push_plain, push_transparent,
-    reflecting, transmitting,
+    Layering, NONE, Setup, diffuse_facets, fibres, push_plain, push_transparent, reflecting,
+    transmitting,
 };
-use super::rough::{LEAST_IOR, edge_tinted, eta, film, filmed, to_model_color};
+use super::rough::{LEAST_IOR, edge_tinted, film, filmed, to_model_color};
 use super::value::{Number, Point, Tint};
 use super::walked::{self, Walked};
 use crate::bsdf::{Bsdf, Closure};
 use crate::color::Rgb;
 use smithwalk_model::layered::Interface;
-use smithwalk_model::{ConductorFresnel, Film, Glass, fresnel};
+use smithwalk_model::{ConductorFresnel, Film, fresnel};
 
 /// OpenPBR's surface; parameters as in [`crate::description::OpenPbr`].
 #[derive(Clone, Copy, Debug)]
@@ -90,12 +90,11 @@ impl OpenPbr {
         });
         let through = self.transmission_color.at::<F>(point);
         let through = to_model_color(through.clamp(Rgb::ZERO, Rgb::ONE));
-        let glass = Glass {
-            eta: eta(below_air.ior, point.front),
-            reflection: below_air.reflection,
+        let clear = |interface| Interface {
             transmission: through,
-            film: film_seen(film, below_air.ior, point.front),
+            ..interface
         };
+        let glass = walked::glass(clear(below_air), point.front);
         let dull = self.base_diffuse_roughness.share::<F>(point);
         let (fixed, method) = match self.setup.layering {
             Layering::Walks(fixed) => (fixed, self.setup.reflecting),
@@ -122,10 +121,7 @@ impl OpenPbr {
             glass: (
                 (1.0 - metalness) * transmission,
                 transmitting(alphas, glass, point.cos, self.setup.glass.unwrap_or(method)),
-                Interface {
-                    transmission: through,
-                    ..below_coat
-                },
+                clear(below_coat),
             ),
             plastic: (
                 (1.0 - metalness) * (1.0 - transmission),

@@ -14,15 +14,15 @@ use glam::Vec3;
 use super::super::Surface;
 use super::rough::{MIN_ALPHA, Tangent, edge_tinted, eta, film, filmed, to_model_color};
 use super::value::{Number, Point, Tint};
-use super::walked::{self, FixedStacks, Walked};
+use super::walked::{self, FixedStacks, Walked, film_seen};
 use crate::bsdf::{
-    Albedos, Bsdf, Clearcoat, Closure, Diffuser, Distribution, Frame, Interface, Lambert, Listed,
-    Method, Mirror, OrenNayar, Rises, RoughClosure, Sheen, WeightedClosure,
+    Albedos, Bsdf, Closure, Diffuser, Distribution, Frame, Interface, Lambert, Listed, Method,
+    Mirror, OrenNayar, Rises, RoughClosure, Sheen, WeightedClosure,
 };
-use crate::color::{Rgb, luminance};
+use crate::color::Rgb;
 use smithwalk_model::layered::Interface as LayerInterface;
 use smithwalk_model::{
-    Conductor, ConductorFresnel, Diffuse, Estimator, Film, Glass, Refraction, Side, fresnel,
+    Conductor, ConductorFresnel, Diffuse, Estimator, Film, Glass, Side, fresnel,
 };
 
 /// What is not a socket of the node.
@@ -386,12 +386,7 @@ impl Principled4 {
             transmission: to_model_color(base.map(f32::sqrt)),
             ..walked::interface(ior, 1.0, [roughness * roughness; 2], tint, film)
         };
-        let glass = Glass {
-            eta: eta(ior, point.front),
-            reflection: through.reflection,
-            transmission: through.transmission,
-            film: film_seen(film, ior, point.front),
-        };
+        let glass = walked::glass(through, point.front);
         let alpha = roughness * roughness;
         let method = self.setup.glass.unwrap_or(self.setup.reflecting);
         let dull = self.diffuse_roughness.share::<F>(point);
@@ -534,10 +529,4 @@ fn smooth_glass(glass: Glass<f32>, cos: f32) -> Closure {
         reflected: Some(Rgb::from(glass.reflected(Side::Above, cos).0)),
         refracted: Rgb::from(glass.transmitted(Side::Above, cos).0),
     })
-}
-
-/// A film on glass of this index as the viewer sees it, in front of the glass or from
-/// inside.
-pub(super) fn film_seen(film: Option<Film<f32>>, ior: f32, front: bool) -> Option<Film<f32>> {
-    film.map(|film| if front { film } else { film.inverted(ior) })
 }

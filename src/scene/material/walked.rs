@@ -5,11 +5,11 @@ use std::sync::OnceLock;
 use super::super::Surface;
 use super::layers::finish;
 use super::principled::{LEAST_CHANCE, NONE};
-use super::rough::to_model_color;
+use super::rough::{eta, to_model_color};
 use crate::bsdf::{Bsdf, Closure, Distribution, Frame, Stack, StackLayers, WeightedClosure};
 use crate::color::Rgb;
 use smithwalk_model::layered::{Base, Finish, Interface, Layered};
-use smithwalk_model::{ConductorFresnel, Film};
+use smithwalk_model::{ConductorFresnel, Film, Glass};
 
 /// The stacks of a node that is everywhere the same, made when they are first met:
 /// without a coat, then with one, in the order of [`Kind`].
@@ -177,4 +177,20 @@ pub(super) fn diffuse(albedo: Rgb, alpha: f32) -> Base<f32> {
         },
         albedo: to_model_color(albedo.clamp(Rgb::ZERO, Rgb::ONE)),
     }
+}
+
+/// Glass of this interface by itself, as the viewer sees it.
+pub(super) fn glass(interface: Interface<f32>, front: bool) -> Glass<f32> {
+    Glass {
+        eta: eta(interface.ior, front),
+        reflection: interface.reflection,
+        transmission: interface.transmission,
+        film: film_seen(interface.film, interface.ior, front),
+    }
+}
+
+/// A film on glass of this index as the viewer sees it, in front of the glass or from
+/// inside.
+pub(super) fn film_seen(film: Option<Film<f32>>, ior: f32, front: bool) -> Option<Film<f32>> {
+    film.map(|film| if front { film } else { film.inverted(ior) })
 }

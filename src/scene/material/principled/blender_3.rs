@@ -1,6 +1,17 @@
 //! The node of Blender 2.8 to 3.6.
 
-use super::*;
+use super::super::super::Surface;
+use super::super::rough::{eta, to_model_color};
+use super::super::value::{Number, Point, Tint};
+use super::super::walked::{self, FixedStacks, Walked};
+use super::{
+    Layering, NONE, Setup, Stack, diffuse_facets, mix, push_transparent, reflecting, rough,
+    stretched, transmitting,
+};
+use crate::bsdf::{Bsdf, Clearcoat, Closure, Diffuser, Interface, Method};
+use crate::color::{Rgb, luminance};
+use smithwalk_model::layered::Interface as LayerInterface;
+use smithwalk_model::{ConductorFresnel, Glass, Refraction, fresnel};
 
 /// The node of Blender 2.8 to 3.6; sockets as in
 /// [`crate::description::Principled3`].
@@ -53,10 +64,8 @@ impl Principled3 {
 
         if let Layering::Walks(fixed) = self.setup.layering {
             let walked = self.walked::<F>(point, share * alpha, fixed);
-            let frame = self
-                .setup
-                .tangent
-                .frame::<F>(self.anisotropic_rotation, point, surface);
+            let rotation = self.anisotropic_rotation;
+            let frame = self.setup.tangent.frame::<F>(rotation, point, surface);
             let albedo = self.albedo::<F>(point);
             walked.add(bsdf, surface, frame, diffuse_facets(albedo, 0.0));
             let mut stack = Stack { bsdf, surface };
@@ -80,10 +89,8 @@ impl Principled3 {
                 f90: to_model_color(Rgb::ONE),
             };
             let alphas = stretched(roughness, self.anisotropic.share::<F>(point));
-            let frame = self
-                .setup
-                .tangent
-                .frame::<F>(self.anisotropic_rotation, point, surface);
+            let rotation = self.anisotropic_rotation;
+            let frame = self.setup.tangent.frame::<F>(rotation, point, surface);
             let bright = Rgb::from(fresnel.reflectance(point.cos).0);
             let method = self.setup.reflecting;
             let method = if roughness <= 0.075 {
@@ -180,12 +187,7 @@ impl Principled3 {
             transmission: to_model_color(base),
             ..walked::interface(ior, 1.0, [alpha; 2], mix(Rgb::ONE, base, tinted), None)
         };
-        let glass = Glass {
-            eta: eta(ior, point.front),
-            reflection: through.reflection,
-            transmission: through.transmission,
-            film: None,
-        };
+        let glass = walked::glass(through, point.front);
         let method = self.setup.glass.unwrap_or(self.setup.reflecting);
         let coat_roughness = self.clearcoat_roughness.share::<F>(point);
         let coat_alpha = coat_roughness * coat_roughness;
