@@ -66,6 +66,22 @@ def render_cycles(scene, spp):
     return mean, variance
 
 
+def make_single(owners):
+    """GGX instead of Multiscatter GGX in every node of every material."""
+    for tree in [o.node_tree for o in owners if o.node_tree] + list(bpy.data.node_groups):
+        for node in tree.nodes:
+            if getattr(node, "distribution", None) == "MULTI_GGX":
+                node.distribution = "GGX"
+
+
+def flip(ours, theirs):
+    """The mean of FLIP, by the renderer's own comparison of two files."""
+    done = subprocess.run([program(), "diff", ours, theirs, "--json"], check=False, text=True, capture_output=True)
+    if done.returncode:
+        raise SystemExit(f"compare.py: smithwalk diff: {done.stderr.strip()}")
+    return json.loads(done.stdout)["flip"]
+
+
 def smooth(values):
     """The mean over 5 × 5 pixels: one difference alone says little about a variance."""
     padded = np.pad(values, 2, mode="edge")
@@ -130,7 +146,7 @@ def sentence(f):
     return (f"smithwalk is {abs(100 * f['bias']):.2f} % ± {100 * f['bias_sd']:.2f} % "
             f"{'brighter' if f['bias'] > 0 else 'darker'} than Cycles on average (no bias above {100 * bound:.2f} %); "
             f"{100 * f['within_noise']:.1f} % of the pixels agree within {_WITHIN:g} standard deviations of noise "
-            f"(98.8 % would by noise alone).")
+            f"(98.8 % would by noise alone); FLIP {f['flip']:.3f}.")
 
 
 def embed(path):
@@ -178,8 +194,9 @@ def main(args):
     parser.add_argument("out", help="the folder to write to")
     parser.add_argument("--spp", type=int, help="samples per pixel (the scene's, at most 128)")
     parser.add_argument("--percent", type=int, help="of the resolution (the scene's)")
-    parser.add_argument("--estimator", help="of smithwalk (auto; from Blender 4 on: single)",
-                        default="auto" if bpy.app.version < (4, 0, 0) else "single")
+    parser.add_argument("--estimator", help="of smithwalk (auto)", default="auto")
+    parser.add_argument("--single", action="store_true",
+                        help="single-scattering GGX on both sides: the multiple scattering of Cycles is not that of smithwalk")
     args = parser.parse_args(args)
     if not bpy.app.binary_path:
         bpy.ops.wm.open_mainfile(filepath=os.path.abspath(args.blend))
@@ -190,6 +207,8 @@ def main(args):
         scene.render.resolution_percentage = args.percent
     spp = args.spp or min(scene.cycles.samples, 128)
 
+    if args.single:
+        make_single(bpy.data.materials)
     log = export(scene, os.path.join(out, "scene"))
     ours_path = os.path.join(out, "smithwalk.exr")
     done = subprocess.run([program(), "render", log.path, "-o", ours_path, "--spp", str(spp), "--estimator",
@@ -202,6 +221,7 @@ def main(args):
     pinned_cycles.write_exr(scene, os.path.join(out, "cycles.exr"), theirs.astype(np.float32))
     ours_variance = smooth(layers["variance"][..., :3].astype(np.float64) @ _LUMINANCE ** 2)
     numbers, z = figures(ours, theirs, ours_variance, theirs_variance)
+    numbers["flip"] = flip(ours_path, os.path.join(out, "cycles.exr"))
 
     level = max(float((theirs @ _LUMINANCE).mean()), 1e-9)
     pictures = {

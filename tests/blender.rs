@@ -75,6 +75,15 @@ fn view_transforms_are_blenders() {
     }
 }
 
+/// F12 without a window: a region, an animation of three frames and all passes are bit for
+/// bit the command line's, and a cancelled render ends within two seconds.
+#[test]
+fn f12_renders_what_the_command_line_does() {
+    if blender_version().is_some() {
+        script(None, "test_f12.py", &[env!("CARGO_BIN_EXE_smithwalk")]);
+    }
+}
+
 /// A failed export must not look like a success: `blender -b` itself exits with
 /// 0 after a Python exception.
 #[test]

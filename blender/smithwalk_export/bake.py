@@ -6,6 +6,7 @@ every object may share it; else over the unwrapped surface of its object,
 which then has the unwrapping's UVs beside its own.
 """
 
+import contextlib
 import hashlib
 from dataclasses import dataclass, field
 
@@ -153,11 +154,12 @@ class Baker:
                     if hasattr(mesh, name):
                         setattr(mesh, name, False)
                 mesh.texspace_location, mesh.texspace_size = location, size
+        original, name = ob.original, ob.name
         color, index, count = tuple(ob.color), ob.pass_index, max(len(ob.data.materials), 1)
         slots = arrays.slots
 
         def look(copy):
-            copy.color, copy.pass_index = color, index
+            copy.color, copy.pass_index, copy.name = color, index, name
 
         def run():
             asked = [list(n.requests) for n in needs]
@@ -169,7 +171,8 @@ class Baker:
                 passes.append(row)
             stored = self.cache.get(key)
             if stored is None and mesh is not None:
-                images, uv = cycles.bake(mesh, matrix, look, passes, self.size)
+                with _without_name(original):
+                    images, uv = cycles.bake(mesh, matrix, look, passes, self.size)
                 stored = {f"image{i}": im.astype(np.float32) for i, im in enumerate(images)} | {"uv": uv}
                 self.cache.put(key, **stored)
             if mesh is not None:
@@ -238,6 +241,19 @@ class Baker:
             return [site] * len(materials), site.uv
         return [self.sites.get(self._square_key(m, self._bounds(ob, n))) if n.requests else None
                 for m, n in zip(materials, needs)], None
+
+
+@contextlib.contextmanager
+def _without_name(ob):
+    """Lends an object's name to its copy: Cycles' random number of an object is a hash of it."""
+    name = ob.name
+    if ob.library is None:
+        ob.name = "smithwalk original"
+    try:
+        yield
+    finally:
+        if ob.library is None:
+            ob.name = name
 
 
 def _images(tree):

@@ -102,6 +102,9 @@ def _image_state(image):
     return str(state)
 
 
+_FORMAT = 2  # changes where the same scene would be baked otherwise than before
+
+
 class Cache:
     """Arrays by the hash of what they were made from."""
 
@@ -112,7 +115,7 @@ class Cache:
     @staticmethod
     def key(*parts):
         """The hash of some texts, and of this Blender's version."""
-        sha = hashlib.sha256(str(bpy.app.version).encode())
+        sha = hashlib.sha256(f"{bpy.app.version} {_FORMAT}".encode())
         for part in parts:
             sha.update(b"\0" + str(part).encode())
         return sha.hexdigest()

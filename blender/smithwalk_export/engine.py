@@ -16,6 +16,7 @@ import threading
 import time
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
 from . import settings
@@ -25,6 +26,7 @@ from .log import APPROXIMATE, WRONG
 from .scene import CACHED, ExportError, Job
 
 ENGINE = "SMITHWALK"
+_NO_DENOISER = "Open Image Denoise 2"  # begins what the program says without its library
 _POLL = 0.1          # seconds between looks at the process
 _TO_STOP = 1.5       # seconds that a cancelled process has to end by itself
 _PARTIAL = 5         # seconds between partial images
@@ -91,6 +93,14 @@ def binary():
     raise ExportError("the smithwalk program was not found: name it in the add-on's preferences")
 
 
+def environment():
+    """The program's environment: newer Blenders bring the denoiser that it can use."""
+    home = os.path.dirname(bpy.app.binary_path or bpy.__file__)
+    own = os.path.join(home, "lib")
+    found = os.path.exists(os.path.join(own, "libOpenImageDenoise.so.2"))
+    return {**os.environ, "OIDN_DIR": os.environ.get("OIDN_DIR", own)} if found else dict(os.environ)
+
+
 class SmithwalkEngine(bpy.types.RenderEngine):
     """Final renders by smithwalk."""
 
@@ -155,6 +165,10 @@ class SmithwalkEngine(bpy.types.RenderEngine):
                 self._hand_over(shown, layer.name, width, height, passes)
 
         ended = self._run(command, layer.name, partial)
+        if ended is not None and settings.DENOISE in command and _NO_DENOISER in ended:
+            self.report({"WARNING"}, f"smithwalk: not denoised: {ended}")
+            command.remove(settings.DENOISE)
+            ended = self._run(command, layer.name, partial)
         if ended is not None:
             self._fail(ended)
         if os.path.isfile(out):
@@ -174,14 +188,14 @@ class SmithwalkEngine(bpy.types.RenderEngine):
         `partial` is called after each checkpoint.
         """
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   encoding="utf-8", errors="replace")
+                                   encoding="utf-8", errors="replace", env=environment())
         lines, readers = [], []
         for pipe in (process.stdout, process.stderr):
             readers.append(threading.Thread(target=lambda pipe=pipe: lines.extend(iter(pipe.readline, "")), daemon=True))
             readers[-1].start()
         shown, checkpoint = 0, None
         while process.poll() is None:
-            if self.test_break():
+            if self._cancelled():
                 _stop(process)
                 break
             while shown < len(lines):
@@ -193,10 +207,14 @@ class SmithwalkEngine(bpy.types.RenderEngine):
             time.sleep(_POLL)
         for reader in readers:
             reader.join(timeout=1.0)
-        if process.returncode in {0, None} or self.test_break():
+        if process.returncode in {0, None} or self._cancelled():
             return None
         said = [line.strip() for line in lines if line.strip() and not line.startswith("{")]
         return " ".join(said[-5:])[:500] or f"the program ended with {process.returncode}"
+
+    def _cancelled(self):
+        """Whether the user wants no more of this."""
+        return self.test_break()
 
     def _show(self, line, layer):
         """Progress: a JSON object per line. Returns when the last checkpoint was, if there was one."""
@@ -224,6 +242,8 @@ class SmithwalkEngine(bpy.types.RenderEngine):
         try:
             found = result.layers[0].passes
             combined = images["Combined"]
+            if "denoised" in images:
+                combined = np.concatenate([images["denoised"], combined[..., 3:]], axis=-1)
             if combined.shape[:2] != (height, width):
                 raise ExportError(f"an image of {width} × {height} was expected, "
                                   f"not {combined.shape[1]} × {combined.shape[0]}")

@@ -45,13 +45,17 @@ class ImageWriter:
         self.files = files
         self.log = log
         self._written = {}  # image name_full → file name or None
+        self.peaks = {}     # file name → the largest value of one that holds floats
 
     def add(self, image, where):
         """The file name of an image, or None (with a warning) if it has no pixels."""
         key = image.name_full
         if key not in self._written:
             write = self._write_tiles if image.source == "TILED" else self._write
-            self._written[key] = write(image, where)
+            file = self._written[key] = write(image, where)
+            if file and image.is_float and file not in self.peaks:  # copied as it is
+                pixels = pixels_of(image)
+                self.peaks[file] = 1.0 if pixels is None else _peak(pixels)
         return self._written[key]
 
     def alpha(self, texture, file):
@@ -178,7 +182,14 @@ class ImageWriter:
             self.files.drop(name)
             self.log.wrong(where, f'image "{stem}" can\'t be written: {error}')
             return None
+        if is_float:
+            self.peaks[name] = _peak(rgba)
         return name
+
+
+def _peak(pixels):
+    finite = pixels[..., :3][np.isfinite(pixels[..., :3])]
+    return float(finite.max()) if finite.size else 0.0
 
 
 def save_image(path, rgba, is_float):

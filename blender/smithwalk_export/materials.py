@@ -7,13 +7,16 @@ surface that can't be carried at all becomes the magenta placeholder.
 """
 
 import math
+from collections import defaultdict
 from dataclasses import replace
 
 import bpy
+import numpy as np
 
 from . import bake, relief
 from .audit import Audit
 from .bake import uniform
+from .images import pixels_of
 from .log import Log
 from .meshes import BAKED, unique_name
 from .nodes import Graph, Texture, Unknown, dependencies, describe
@@ -75,6 +78,8 @@ class MaterialWriter:
         self.materials = {}     # name in the scene → material
         self.textures = {}      # name in the scene → texture
         self.radial_axes = {}   # name in the scene → axes its tangents turn about
+        self.steepness = defaultdict(float)  # name in the scene → metres that its bumps rise per width of their image
+        self._heights = {}      # name in the scene of a texture → (its image or array, how often it repeats)
         self._looked_up = {}    # name in the scene → textures of UV maps or colours of vertices
         self._current = None    # the material that is written
         self.perturbed = set()  # names in the scene of those with normals or heights from textures
@@ -155,8 +160,23 @@ class MaterialWriter:
                     if (c, f) != (0.0, 0.0):
                         entry["offset"] = [c, f]
                 name = self._add_texture(file, entry)
+                self._heights[name] = texture.image, max(abs(x) for x in (a, b, d, e))
             self._textures[key] = name
         return self._textures[key]
+
+    def peak(self, name):
+        """The largest value of a texture's image, where that holds floats; else 1."""
+        return self.images.peaks.get(self.textures[name].get("file"), 1.0) if self.images is not None else 1.0
+
+    def slope(self, name):
+        """The root mean square slope of the values of a texture, per unit of UVs."""
+        image, repeats = self._heights.get(name, (None, 0.0))
+        if isinstance(image, bpy.types.Image):
+            image = pixels_of(image)
+        if image is None or image.shape[1] < 2:
+            return 0.0
+        rows = image[::max(image.shape[0] // 256, 1), :, :3].mean(axis=2)
+        return math.sqrt(2.0 * float(np.square(np.diff(rows, axis=1)).mean())) * image.shape[1] * repeats
 
     def _add_texture(self, file, entry):
         name = unique_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], self.textures)
@@ -167,7 +187,6 @@ class MaterialWriter:
         """The name in the scene of a baked image."""
         key = (site.key, material.name_full, request)
         if key not in self._textures:
-            import numpy as np
             rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
             rgba[..., :3] = np.where(np.isfinite(image), image, 0.0)
             label = unique_name(f"{material.name}_{request[1]}_{request[2] or 'all'}", ())
@@ -182,6 +201,7 @@ class MaterialWriter:
                     entry["scale"] = [1.0 / (u1 - u0), 1.0 / (v1 - v0)]
                     entry["offset"] = [-u0 / (u1 - u0), -v0 / (v1 - v0)]
                 name = self._add_texture(file, entry)
+                self._heights[name] = image, 1.0 / max(u1 - u0, 1e-6)
             self._textures[key] = name
         return self._textures[key]
 
@@ -357,6 +377,9 @@ class _Surface:
         """A colour input: a number, a list, or `{texture}`; magenta if it can't be carried."""
         value = self.value(node, name, groups)
         if isinstance(value, dict):
+            peak = self.writer.peak(value["texture"]) if unit else 0.0
+            if peak > 1.001:
+                self.warn(f"{name} comes from an image with values up to {peak:.4g}: clamped to 1", node)
             return value
         if isinstance(value, Unknown):
             self.wrong(f"{name} comes from {value.what}: magenta placeholder", node)

@@ -36,10 +36,13 @@ def _bump(surface, source):
         surface.warn("its own normal comes from another bump: that one is left out", node)
         del below["bump"]
     bump = dict(height)
+    rise = surface.writer.slope(height["texture"])
     for name, usual in (("Strength", 1.0), ("Distance", 1.0)):
         value = surface.scalar(node, name, groups, 0.0)
         if value != usual:
             bump[name.lower()] = value
+        rise *= value if isinstance(value, float) else 1.0
+    surface.writer.steepness[surface.name] = max(rise, surface.writer.steepness[surface.name])
     if surface.graph.view(node).invert:
         bump["invert"] = True
     # Until 4.3 Cycles compared heights a whole pixel apart.

@@ -5,11 +5,13 @@ levels, its visibility. The export therefore runs as a render engine of its
 own, for Blender hands an engine the scene as it is to be rendered.
 """
 
+import math
 import os
 import sys
 import time
 
 import bpy
+import numpy as np
 
 from . import cycles, lights, settings, view, yaml
 from .audit import DEFAULTS, Audit
@@ -19,7 +21,7 @@ from .files import Folder
 from .images import ImageWriter
 from .log import Log
 from .materials import MaterialWriter
-from .meshes import MeshWriter
+from .meshes import LEAN, MeshWriter
 from .world import WorldWriter
 
 FORMAT_VERSION = 1
@@ -295,7 +297,7 @@ class Job:
                 if lamp:
                     lamps.append(lamp)
             elif ob.type == "MESH":
-                entry = self._object(ob, matrix, meshes, depsgraph, where)
+                entry = self._object(ob, matrix, meshes, depsgraph, where, instance.is_instance)
                 if entry:
                     objects.append(entry)
                 else:
@@ -324,7 +326,7 @@ class Job:
         for what in self.audit.leftovers(ob):
             self.log.warn(where, f"{what}: left out")
 
-    def _object(self, ob, matrix, meshes, depsgraph, where):
+    def _object(self, ob, matrix, meshes, depsgraph, where, is_instance):
         if not len(ob.data.polygons):
             return None
         if not lights.is_finite(matrix):
@@ -348,6 +350,9 @@ class Job:
             if key not in self._sites:
                 self._sites[key] = self.baker.site(ob, matrix, materials, needs)
             sites, uv = self._sites[key]
+            if is_instance and any(n.instance for n in needs):
+                self.log.warn(where, "what its materials take from the place or number of an instance is the same "
+                                     "for all of them")
         by_slot = {i: self.materials.add(m, s) for i, m, s in zip(slots, materials, sites)}
         uv_maps, colors = self.materials.attributes(by_slot.values())
         written = meshes.add(ob, uv_maps, colors, uv, self.materials.looks_along(by_slot.values()), transform,
@@ -372,7 +377,20 @@ class Job:
         if ob.is_holdout or original.holdout_get(view_layer=depsgraph.view_layer):
             entry["holdout"] = True
         self._check_tangents(ob, names, where)
+        self._check_bumps(ob, matrix, names, where)
         return entry
+
+    def _check_bumps(self, ob, matrix, names, where):
+        """Far from the surface, Cycles loses light on leaning normals, which is kept here."""
+        steepest = max(self.materials.steepness[n] for n in names)
+        if steepest:
+            areas = np.empty(len(ob.data.polygons), dtype=np.float32)
+            ob.data.polygons.foreach_get("area", areas)
+            side = math.sqrt(max(float(np.nansum(areas)), 1e-12) * abs(matrix.to_3x3().determinant()) ** (2.0 / 3.0))
+            angle = math.degrees(math.atan(steepest / max(side, 1e-6)))
+            if angle > LEAN:
+                self.log.warn(where, f"bumps lean normals by some {angle:.0f}°: light that Cycles loses there is kept, "
+                                     "and goes elsewhere")
 
     def _check_tangents(self, ob, names, where):
         """Blender's radial tangents turn in coordinates that the bounding box scales, the
@@ -393,14 +411,12 @@ class _NoCamera:
 
 
 def _used_slots(mesh):
-    import numpy as np
     slots = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("material_index", slots)
     return [int(s) for s in np.unique(np.clip(slots, 0, max(len(mesh.materials) - 1, 0)))]
 
 
 def _rank(matrix):
-    import numpy as np
     values = np.linalg.svd(np.array(matrix.to_3x3()), compute_uv=False)
     return int((values > max(values.max() * 1e-6, 1e-9)).sum())
 

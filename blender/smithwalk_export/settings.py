@@ -5,6 +5,7 @@ from .nodes import working_space
 
 # Settings whose default already is another picture than the renderer's: told
 # once, in short, while they have the default.
+DENOISE = "--denoise"
 _LIMITS = ("diffuse", "glossy", "transmission")
 # Settings with a default that depends on the file, read by others, or without a say.
 _ACCEPTED = (
@@ -54,6 +55,8 @@ def film(scene, log, view_section=None):
         section["transparent"] = True
     if view_section:
         section["view"] = view_section
+        if "false" in view.transform(scene).lower():
+            log.warn("scene", "the steps of false colours are met between them alone: PNGs blend them")
     return section
 
 
@@ -66,7 +69,7 @@ def sampling(scene, view_layer):
 
 
 def options(scene):
-    """What of the settings `smithwalk render` takes as options: noise, time, region."""
+    """What of the settings `smithwalk render` takes as options: noise, time, denoising, region."""
     cycles, render = scene.cycles, scene.render
     chosen = []
     if cycles.use_adaptive_sampling or cycles.time_limit > 0.0:
@@ -76,6 +79,8 @@ def options(scene):
         chosen += ["--noise", f"{cycles.adaptive_threshold or cycles.samples ** -0.5:.4g}"]
     if cycles.time_limit > 0.0:
         chosen += ["--time", f"{cycles.time_limit:g}"]
+    if cycles.use_denoising:
+        chosen.append(DENOISE)
     region = border(render)
     if region:
         chosen += ["--crop", ",".join(map(str, region))]
@@ -125,7 +130,7 @@ def tell(scene, view_layer, audit, log, composited, by_engine=False):
         else:
             log.warn("scene", f"bounce limits by kind are left out ({text}): {cycles.max_bounces} for all")
     if cycles.use_denoising:
-        general.append("denoising")
+        log.general("scene", "Cycles' denoising is an option of `smithwalk render`: --denoise")
     seen.accept("cycles.sample_clamp_direct", "cycles.sample_clamp_indirect", "cycles.blur_glossy",
                 "cycles.max_bounces", *(f"cycles.{kind}_bounces" for kind in _LIMITS))
     if general:

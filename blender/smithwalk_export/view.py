@@ -27,6 +27,11 @@ def _settings(scene):
     return scene.view_settings, scene.display_settings
 
 
+def transform(scene):
+    """The name of the view transform of saved images."""
+    return _settings(scene)[0].view_transform
+
+
 def exposure(scene):
     """The exposure of PNG files in stops; curves come before it, so with them it is in the table."""
     view, _ = _settings(scene)
