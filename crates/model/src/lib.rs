@@ -7,7 +7,7 @@
 //! It keeps all the energy that single scattering loses, for any roughness.
 //!
 //! A [`Microsurface`] is a distribution of normals ([`Ggx`], [`Beckmann`],
-//! [`Quadratic`], or any other [`Ndf`]) and what its facets do ([`Conductor`],
+//! [`Quadratic`], a [`NormalTable`], or any other [`Ndf`]) and what its facets do ([`Conductor`],
 //! [`Dielectric`], [`Diffuse`], or any other [`Facets`]), in `f32` or `f64`.
 //! It knows nothing of a renderer. Several such surfaces over one another are
 //! a stack ([`layered`]).

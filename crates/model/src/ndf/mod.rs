@@ -4,11 +4,13 @@ mod beckmann;
 mod ggx;
 mod quadratic;
 mod student_t;
+mod tabulated;
 
 pub use beckmann::Beckmann;
 pub use ggx::Ggx;
 pub use quadratic::Quadratic;
 pub use student_t::StudentT;
+pub use tabulated::{NormalTable, NormalTableError, Tabulated};
 
 use num_traits::{Float, Zero};
 
@@ -93,4 +95,30 @@ fn rotate_to_azimuth<F: Real>(x: F, y: F, v: Vector3<F>) -> Vector3<F> {
     }
     let (cos, sin) = (x / r, y / r);
     Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+}
+
+/// The zero between `left` and `right` of a rising function that is given with its
+/// slope: Newton's method, and halves where that leaves the interval.
+fn zero(f: impl Fn(f64) -> (f64, f64), mut left: f64, mut right: f64) -> f64 {
+    let mut x = 0.5 * (left + right);
+    for _ in 0..100 {
+        let (value, slope) = f(x);
+        if value > 0.0 {
+            right = x;
+        } else {
+            left = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton > left && newton < right {
+            newton
+        } else {
+            0.5 * (left + right)
+        };
+        let moved = (next - x).abs();
+        x = next;
+        if moved <= 1e-15 * (1.0 + x.abs()) {
+            break;
+        }
+    }
+    x
 }

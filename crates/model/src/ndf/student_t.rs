@@ -1,6 +1,6 @@
 use statrs::function::beta::{beta, beta_reg};
 
-use super::{Ndf, Real, Vector3, length, rotate_to_azimuth};
+use super::{Ndf, Real, Vector3, length, rotate_to_azimuth, zero};
 
 /// Student's t-distribution of slopes, with slope roughness α along x and y and
 /// the exponent γ: D(m) = (1 + tan²θ_m/(γ − 1))^(−γ) / (π α_x α_y m_z⁴) with the
@@ -208,30 +208,4 @@ impl Slopes {
         let distance = width * zero(rarity, 0.0, end).sinh();
         if v < 0.5 { -distance } else { distance }
     }
-}
-
-/// The zero between `left` and `right` of a rising function that is given with its
-/// slope: Newton's method, and halves where that leaves the interval.
-fn zero(f: impl Fn(f64) -> (f64, f64), mut left: f64, mut right: f64) -> f64 {
-    let mut x = 0.5 * (left + right);
-    for _ in 0..100 {
-        let (value, slope) = f(x);
-        if value > 0.0 {
-            right = x;
-        } else {
-            left = x;
-        }
-        let newton = x - value / slope;
-        let next = if newton > left && newton < right {
-            newton
-        } else {
-            0.5 * (left + right)
-        };
-        let moved = (next - x).abs();
-        x = next;
-        if moved <= 1e-15 * (1.0 + x.abs()) {
-            break;
-        }
-    }
-    x
 }

@@ -5,6 +5,7 @@ mod estimators;
 mod lanes;
 mod layered;
 mod normals;
+mod tabulated;
 
 use super::*;
 use rand::SeedableRng;
