@@ -38,6 +38,7 @@ __all__ = [
     "Interface",
     "Lobe",
     "Material",
+    "NormalTable",
     "Render",
     "RenderError",
     "SceneMaterial",
@@ -59,6 +60,15 @@ _Triple = tuple[float, float, float]
 _Normals = tuple[str, tuple[float, float], float]
 _Bottom = tuple[str, _Normals, _Triple, _Triple]
 _BLACK: _Triple = (0.0, 0.0, 0.0)
+
+
+class NormalTable(NamedTuple):
+    """A distribution of normals by rings of constant density: `distribution=NormalTable(edges, density)`."""
+
+    edges: ArrayLike
+    """Angles from the macroscopic normal in radians, (rings + 1,), from 0 up to π/2 at most."""
+    density: ArrayLike
+    """D of each ring up to a common factor, (rings,); it is scaled to ∫ D(m) m_z dm = 1."""
 
 
 class Albedo(NamedTuple):
@@ -214,7 +224,7 @@ class Material:
 def conductor(
     *,
     alpha: float | tuple[float, float] | None = None,
-    distribution: str = "ggx",
+    distribution: str | NormalTable = "ggx",
     gamma: float | None = None,
     color: ArrayLike | None = None,
     eta: ArrayLike | None = None,
@@ -224,7 +234,7 @@ def conductor(
 
     `alpha`: slope roughness α (not its square root), one number or (α_x along the
     tangent, α_y); not for `distribution='quadratic'`, which has none. `distribution`:
-    'ggx', 'beckmann', 'student-t' or 'quadratic'. `gamma`: exponent of 'student-t',
+    'ggx', 'beckmann', 'student-t', 'quadratic' or a `NormalTable`. `gamma`: exponent of 'student-t',
     above 1.5: 2 is GGX, large ones go to Beckmann (Ribardière et al. 2017). `color`:
     0 to 1, one number or three; default 1. `eta`, `k`: relative to the outside,
     one number or three each.
@@ -239,17 +249,17 @@ def conductor(
         eta, k = _channels("eta", eta, 0.0, np.inf), _channels("k", k, 0.0, np.inf)
         if min(eta) <= 0.0:
             raise ValueError("eta: expected numbers above 0")
-        surface = _smithwalk.Surface.conductor_complex(normals, eta, k)
+        surface = _smithwalk.Surface.conductor_complex(normals, _rings(distribution), eta, k)
         return Material(surface, f"{shown}, eta={eta}, k={k})", ("complex", normals, eta, k))
     color = _channels("color", 1.0 if color is None else color, 0.0, 1.0)
-    surface = _smithwalk.Surface.conductor_color(normals, color)
+    surface = _smithwalk.Surface.conductor_color(normals, _rings(distribution), color)
     return Material(surface, f"{shown}, color={color})", ("color", normals, color, _BLACK))
 
 
 def dielectric(
     *,
     alpha: float | tuple[float, float] | None = None,
-    distribution: str = "ggx",
+    distribution: str | NormalTable = "ggx",
     gamma: float | None = None,
     eta: float = 1.5,
     color: ArrayLike = 1.0,
@@ -265,21 +275,21 @@ def dielectric(
     if not (0.0 < eta < np.inf):
         raise ValueError(f"eta: expected a number above 0, found {eta}")
     color = _channels("color", color, 0.0, 1.0)
-    surface = _smithwalk.Surface.dielectric(normals, eta, color)
+    surface = _smithwalk.Surface.dielectric(normals, _rings(distribution), eta, color)
     return Material(surface, f"dielectric({_shown(distribution, alpha, gamma)}, eta={eta}, color={color})")
 
 
 def diffuse(
     *,
     alpha: float | tuple[float, float] | None = None,
-    distribution: str = "ggx",
+    distribution: str | NormalTable = "ggx",
     gamma: float | None = None,
     color: ArrayLike = 1.0,
 ) -> Material:
     """Lambertian facets of albedo `color`, 0 to 1. `alpha`, `distribution`, `gamma`: as for `conductor`."""
     normals = _normals(distribution, alpha, gamma)
     color = _channels("color", color, 0.0, 1.0)
-    surface = _smithwalk.Surface.diffuse(normals, color)
+    surface = _smithwalk.Surface.diffuse(normals, _rings(distribution), color)
     shown = f"diffuse({_shown(distribution, alpha, gamma)}, color={color})"
     return Material(surface, shown, ("diffuse", normals, color, _BLACK))
 
@@ -317,8 +327,8 @@ def layered(interfaces: Sequence[Interface], base: Material | None = None) -> Ma
     Source: Guo, Hašan and Zhao 2018, "Position-Free Monte Carlo Simulation for Arbitrary
     Layered BSDFs".
     """
-    if base is not None and base._bottom is None:
-        raise ValueError("base: expected a conductor, diffuse or lambert material, or None")
+    if base is not None and (base._bottom is None or base._bottom[1][0] == "table"):
+        raise ValueError("base: expected a conductor, diffuse or lambert material without a table, or None")
     layers = []
     for interface in interfaces:
         ior, alpha, distribution, absorption, thickness = Interface(*interface)
@@ -330,6 +340,12 @@ def layered(interfaces: Sequence[Interface], base: Material | None = None) -> Ma
         layers.append((float(ior), normals, _channels("absorption", absorption, 0.0, np.inf), float(thickness)))
     surface = _smithwalk.Surface.layered(layers, None if base is None else base._bottom)
     return Material(surface, f"layered({list(interfaces)!r}, base={base!r})")
+
+
+def _rings(distribution: str | NormalTable) -> tuple[list[float], list[float]] | None:
+    if isinstance(distribution, str):
+        return None
+    return tuple(np.asarray(values, float).ravel().tolist() for values in NormalTable(*distribution))
 
 
 def _alpha(distribution: str, alpha: float | tuple[float, float] | None) -> tuple[float, float]:
@@ -347,8 +363,12 @@ def _alpha(distribution: str, alpha: float | tuple[float, float] | None) -> tupl
 
 
 def _normals(
-    distribution: str, alpha: float | tuple[float, float] | None, gamma: float | None
+    distribution: str | NormalTable, alpha: float | tuple[float, float] | None, gamma: float | None
 ) -> tuple[str, tuple[float, float], float]:
+    if not isinstance(distribution, str):
+        if alpha is not None or gamma is not None:
+            raise ValueError("alpha: a table has its roughness in it")
+        return ("table", (1.0, 1.0), 2.0)
     if (gamma is None) == (distribution == "student-t"):
         raise ValueError("gamma: belongs to the distribution 'student-t', which needs it")
     exponent = 2.0 if gamma is None else float(gamma)
@@ -357,7 +377,7 @@ def _normals(
     return (distribution, _alpha(distribution, alpha), exponent)
 
 
-def _shown(distribution: str, alpha: object, gamma: object) -> str:
+def _shown(distribution: str | NormalTable, alpha: object, gamma: object) -> str:
     shown = f"distribution={distribution!r}" + ("" if alpha is None else f", alpha={alpha}")
     return shown + ("" if gamma is None else f", gamma={gamma}")
 

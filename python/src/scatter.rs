@@ -1,9 +1,12 @@
 //! What is measured: a microsurface of whichever distribution and facets.
 
+use std::sync::Arc;
+
 use rand_pcg::Pcg64Mcg;
 use smithwalk_model::layered::Layered;
 use smithwalk_model::{
-    Estimator, Exit, Facets, Microsurface, Ndf, PerOrder, Rgb, Split, Stream, Total, Vector3,
+    Estimator, Exit, Facets, Microsurface, Ndf, NormalTable, PerOrder, Rgb, Split, Stream,
+    Tabulated, Total, Vector3,
 };
 
 /// The generator that each point has one of.
@@ -70,6 +73,46 @@ where
 
     fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
         Microsurface::pdf(self, wi, wo)
+    }
+}
+
+/// A microsurface whose normals are from a table, which it owns.
+struct OfTable<I> {
+    table: Arc<NormalTable>,
+    facets: I,
+}
+
+impl<I: Facets<Scalar = f64>> OfTable<I> {
+    fn surface(&self) -> Microsurface<Tabulated<'_, f64>, I> {
+        Microsurface {
+            ndf: self.table.normals(),
+            facets: self.facets,
+        }
+    }
+}
+
+impl<I: Facets<Scalar = f64> + Send + Sync> Scatter for OfTable<I> {
+    fn eval(&self, method: Method, wi: Vector3<f64>, wo: Vector3<f64>, rng: &mut Rng) -> Rgb<f64> {
+        Scatter::eval(&self.surface(), method, wi, wo, rng)
+    }
+
+    fn eval_orders(
+        &self,
+        estimator: Estimator,
+        wi: Vector3<f64>,
+        wo: Vector3<f64>,
+        rng: &mut Rng,
+        orders: &mut PerOrder<f64>,
+    ) {
+        Scatter::eval_orders(&self.surface(), estimator, wi, wo, rng, orders);
+    }
+
+    fn sample(&self, wi: Vector3<f64>, rng: &mut Rng) -> Option<Exit<f64>> {
+        Scatter::sample(&self.surface(), wi, rng)
+    }
+
+    fn pdf(&self, wi: Vector3<f64>, wo: Vector3<f64>) -> f64 {
+        Scatter::pdf(&self.surface(), wi, wo)
     }
 }
 
@@ -145,6 +188,22 @@ impl Sides {
                 let facets = facets.inverted();
                 Box::new(Microsurface { ndf, facets }) as Box<dyn Scatter>
             }),
+        }
+    }
+
+    /// A microsurface whose normals are from a table.
+    pub fn of_table<I>(table: NormalTable, facets: I) -> Self
+    where
+        I: Facets<Scalar = f64> + Send + Sync + 'static,
+    {
+        let table = Arc::new(table);
+        let seen = |facets| -> Box<dyn Scatter> {
+            let table = Arc::clone(&table);
+            Box::new(OfTable { table, facets })
+        };
+        Self {
+            above: seen(facets),
+            below: I::TRANSMITS.then(|| seen(facets.inverted())),
         }
     }
 

@@ -6,8 +6,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use smithwalk_model::layered::{Base, Finish, Interface, Layered};
 use smithwalk_model::{
-    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Facets, Ggx, Quadratic,
-    Rgb, StudentT, Vector3,
+    Beckmann, Conductor, ConductorFresnel, Dielectric, Diffuse, Estimator, Facets, Ggx,
+    NormalTable, Quadratic, Rgb, StudentT, Vector3,
 };
 
 use crate::measure::{self, Albedo, Directions};
@@ -20,10 +20,18 @@ pub struct Surface(Sides);
 /// A distribution of normals: its name, α_x and α_y, and γ for Student's.
 type Normals<'a> = (&'a str, [f64; 2], f64);
 
-fn with<I>((distribution, alpha, gamma): Normals<'_>, facets: I) -> PyResult<Surface>
+/// Edges, radians from the normal, and densities of a table, which is no name's.
+type Rings = Option<(Vec<f64>, Vec<f64>)>;
+
+fn with<I>((distribution, alpha, gamma): Normals<'_>, rings: Rings, facets: I) -> PyResult<Surface>
 where
     I: Facets<Scalar = f64> + Send + Sync + 'static,
 {
+    if let Some((edges, densities)) = rings {
+        let table = NormalTable::new(&edges, &densities);
+        let table = table.map_err(|error| PyValueError::new_err(format!("table: {error}")))?;
+        return Ok(Surface(Sides::of_table(table, facets)));
+    }
     let [alpha_x, alpha_y] = alpha;
     let sides = match distribution {
         "ggx" => Sides::of(Ggx { alpha_x, alpha_y }, facets),
@@ -122,30 +130,35 @@ fn columns<'py>(py: Python<'py>, found: impl Iterator<Item = measure::Estimate>)
 #[pymethods]
 impl Surface {
     #[staticmethod]
-    fn conductor_color(normals: Normals<'_>, color: [f64; 3]) -> PyResult<Self> {
+    fn conductor_color(normals: Normals<'_>, rings: Rings, color: [f64; 3]) -> PyResult<Self> {
         let fresnel = ConductorFresnel::Constant(Rgb(color));
-        with(normals, Conductor { fresnel })
+        with(normals, rings, Conductor { fresnel })
     }
 
     #[staticmethod]
-    fn conductor_complex(normals: Normals<'_>, eta: [f64; 3], k: [f64; 3]) -> PyResult<Self> {
+    fn conductor_complex(
+        normals: Normals<'_>,
+        rings: Rings,
+        eta: [f64; 3],
+        k: [f64; 3],
+    ) -> PyResult<Self> {
         let fresnel = ConductorFresnel::Complex {
             eta: Rgb(eta),
             k: Rgb(k),
         };
-        with(normals, Conductor { fresnel })
+        with(normals, rings, Conductor { fresnel })
     }
 
     #[staticmethod]
-    fn dielectric(normals: Normals<'_>, eta: f64, tint: [f64; 3]) -> PyResult<Self> {
+    fn dielectric(normals: Normals<'_>, rings: Rings, eta: f64, tint: [f64; 3]) -> PyResult<Self> {
         let tint = Rgb(tint);
-        with(normals, Dielectric { eta, tint })
+        with(normals, rings, Dielectric { eta, tint })
     }
 
     #[staticmethod]
-    fn diffuse(normals: Normals<'_>, albedo: [f64; 3]) -> PyResult<Self> {
+    fn diffuse(normals: Normals<'_>, rings: Rings, albedo: [f64; 3]) -> PyResult<Self> {
         let albedo = Rgb(albedo);
-        with(normals, Diffuse { albedo })
+        with(normals, rings, Diffuse { albedo })
     }
 
     #[staticmethod]

@@ -84,6 +84,23 @@ def test_students_distribution_is_ggx_at_two_and_goes_to_beckmann():
     np.testing.assert_allclose(tails.reflected, 1.0, atol=1e-9)
 
 
+def test_a_table_of_the_quadratic_distribution_has_its_closed_form():
+    edges = np.linspace(0.0, np.pi / 2, 97)
+    middle = (np.cos(edges[:-1]) + np.cos(edges[1:])) / 2
+    table = smithwalk.NormalTable(edges, middle**2)
+    white = smithwalk.conductor(distribution=table)
+    wi, wo = smithwalk.spherical(0.7, 0.3), smithwalk.spherical([0.8, 0.4], [2.0, 5.0])
+    value, stderr = white.eval(wi, wo, samples=20_000)
+    exact = mirror(wi, wo)[:, None]
+    agree(value, stderr, exact, slack=0.015 * exact.max())  # steps of D, a ring wide
+    glass = smithwalk.dielectric(distribution=table).albedo([0.7, -0.7], samples=5_000)
+    np.testing.assert_allclose(glass.reflected + glass.transmitted, 1.0, atol=1e-9)
+    with pytest.raises(ValueError, match="table: edge 2"):
+        smithwalk.diffuse(distribution=smithwalk.NormalTable([0.0, 1.0, 0.5], [1.0, 1.0]))
+    with pytest.raises(ValueError, match="alpha: a table"):
+        smithwalk.diffuse(distribution=table, alpha=0.5)
+
+
 def test_layers_over_lambert_have_their_exact_albedo():
     """R = F + (1 - F)(1 - Fi) c / (1 - c Fi), Fi = 1 - (1 - Fe)/n², for a smooth interface over albedo c."""
     n, c, cos = 1.5, np.array([0.8, 0.5, 0.1]), np.array([0.95, 0.5, 0.2])
