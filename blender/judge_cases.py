@@ -43,6 +43,13 @@ def blocks(pixels, size=4):
     return pixels[:height, :width].reshape(height // size, size, width // size, size, 3).mean(axis=(1, 3))
 
 
+def crop(scene):
+    """The region that the export says to render, as (x0, y0, x1, y1), or None: it is no part of a scene."""
+    with open(scene, encoding="utf-8") as f:
+        words = next((line.split() for line in f if "as options of `smithwalk render`" in line), [])
+    return tuple(map(int, words[words.index("--crop") + 1].split(","))) if "--crop" in words else None
+
+
 def differences(ours, theirs):
     """Relative difference of the means, and the mean relative difference of the blocks."""
     bias = ours.mean() / theirs.mean() - 1.0
@@ -59,13 +66,19 @@ def judge(folder, options):
     if "error" in case:
         return "refused", None, None, [case["error"]]
     said = [w for w in case["warnings"] if not any(a in w for a in _ALWAYS)]
-    out = os.path.join(folder, "smithwalk.exr")
-    done = subprocess.run([program(), "render", os.path.join(folder, "scene.yaml"), "-o", out, *options],
+    scene, out = (os.path.join(folder, name) for name in ("scene.yaml", "smithwalk.exr"))
+    region = crop(scene)
+    if region:
+        options = [*options, "--crop", ",".join(map(str, region))]
+    done = subprocess.run([program(), "render", scene, "-o", out, *options],
                           check=False, capture_output=True, text=True)
     if done.returncode:
         return "refused", None, None, [done.stderr.strip()[:300]]
     ours, theirs = (exr.read(p)["Combined"][..., :3].astype(np.float64)
                     for p in (out, os.path.join(folder, "cycles.exr")))
+    if region and theirs.shape[:2] > ours.shape[:2]:
+        x0, y0, x1, y1 = region
+        theirs = theirs[y0:y1, x0:x1]
     if ours.shape != theirs.shape:
         return ("told" if said else "silent"), None, None, said + [f"{ours.shape} against {theirs.shape}"]
     if not theirs.any():

@@ -16,7 +16,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "sce
 
 import bpy  # noqa: E402
 import common  # noqa: E402
-from smithwalk_export import yaml  # noqa: E402
+from smithwalk_export import exr, yaml  # noqa: E402
 from smithwalk_export.log import APPROXIMATE, WRONG  # noqa: E402
 from smithwalk_export.scene import NO_BAKE, export  # noqa: E402
 
@@ -282,8 +282,9 @@ class ExportTest(unittest.TestCase):
     def test_normals(self):
         """A normal map on a named UV map that is not the active one, and bump on it."""
         image = bpy.data.images.new("hills", 4, 4)
-        image.pack()
         image.colorspace_settings.name = "Non-Color"
+        image.pixels.foreach_set([0.5, 0.5, 1.0, 1.0] * 16)
+        image.pack()
         mat, node = self.surface("ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
         bpy.context.object.data.uv_layers.new(name="Second")
         tree = mat.node_tree
@@ -306,6 +307,57 @@ class ExportTest(unittest.TestCase):
         with open(self.path("cube_second.obj"), encoding="ascii") as f:
             kinds = [line.split()[0] for line in f]
         self.assertEqual((kinds.count("v"), kinds.count("f")), (8, 6))
+
+    def test_steep_normals_are_told(self):
+        """A normal map that leans far, and heights that rise fast: Cycles loses light there."""
+        image = bpy.data.images.new("steep", 4, 4)
+        image.colorspace_settings.name = "Non-Color"
+        image.pixels.foreach_set([0.9, 0.5, 0.7, 1.0, 0.1, 0.5, 0.7, 1.0] * 8)
+        image.pack()
+        mat, node = self.surface("ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5))
+        tree = mat.node_tree
+        lookup, normal, bump = (tree.nodes.new(n) for n in (
+            "ShaderNodeTexImage", "ShaderNodeNormalMap", "ShaderNodeBump"))
+        lookup.image = image
+        bump.inputs["Distance"].default_value = 2.0
+        tree.links.new(lookup.outputs["Color"], normal.inputs["Color"])
+        tree.links.new(normal.outputs[0], node.inputs["Normal"])
+        self.export()
+        self.assertRegex("".join(self.losses()), "its normals lean by 63° and more")
+        tree.links.new(lookup.outputs["Color"], bump.inputs["Height"])
+        tree.links.new(bump.outputs[0], node.inputs["Normal"])
+        self.export()
+        self.assertRegex("".join(self.losses()), "bumps lean normals by some")
+
+    def test_color_spaces(self):
+        """An image of another colour space is converted as Blender does it; what passes 1 is told."""
+        image = bpy.data.images.new("log", 2, 1)
+        image.pixels.foreach_set([0.25, 0.25, 0.25, 1.0, 1.0, 1.0, 1.0, 1.0])
+        image.pack()
+        image.colorspace_settings.name = "Filmic Log"
+        mat, node = self.surface("ShaderNodeBsdfDiffuse")
+        lookup = mat.node_tree.nodes.new("ShaderNodeTexImage")
+        lookup.image = image
+        mat.node_tree.links.new(lookup.outputs["Color"], node.inputs["Color"])
+        self.export()
+        self.assertEqual(self.line("log:"), "log: {file: log.exr, color_space: linear}")
+        dark, light = exr.read_channels(self.path("log.exr"))["R"][0]
+        # Filmic's logarithm: 2⁻¹²·⁴⁷³⁹³ to 2⁴·⁰²⁶⁰⁶ of 0.18, here 0.25 rounded to 64 of 255.
+        self.assertAlmostEqual(dark, 2.0 ** (-12.473931188 + 16.5 * 64 / 255), delta=2e-5)
+        self.assertRegex("".join(self.losses()), "values up to .*: clamped to 1")
+
+    def test_random_numbers_are_the_objects_own(self):
+        """Object Info's random number comes out of a bake, different for two cubes of one material."""
+        mat, node = self.surface("ShaderNodeBsdfDiffuse")
+        info = mat.node_tree.nodes.new("ShaderNodeObjectInfo")
+        mat.node_tree.links.new(info.outputs["Random"], node.inputs["Color"])
+        names = [bpy.context.object.name, self.cube(location=(2.0, 0.0, 0.0)).name]
+        bpy.context.object.data.materials[0] = mat
+        self.export(bake_size=16)
+        baked = [f for f in os.listdir(self.folder.name) if f.startswith("baked_test")]
+        self.assertEqual(len({exr.read_channels(self.path(f))["R"].max() for f in baked}), 2, baked)
+        self.assertEqual(self.losses(), [])
+        self.assertEqual([ob.name for ob in bpy.data.objects if ob.type == "MESH"], names)
 
     def test_vertex_colors(self):
         """Colours of corners: a file beside the mesh, linear."""
@@ -415,6 +467,24 @@ class ExportTest(unittest.TestCase):
         self.assertIn("hidden_from: [glossy]", self.line("{area: "))
         self.assertEqual(sum("hidden_from: [camera]" in line for line in self.lines), 1 if visibility else 0)
         self.assertIn("[0.1, 6]", self.line("clip:"))
+        self.assertEqual(self.losses(), [])
+
+    def test_a_backdrop_for_the_camera(self):
+        """A world that is another colour to the camera: a box that the camera alone sees."""
+        self.cube()
+        common.constant_world(self.scene, (0.25, 0.5, 1.0), 1.0)
+        tree = self.scene.world.node_tree
+        mix, white, path = (tree.nodes.new(f"ShaderNode{n}") for n in ("MixShader", "Background", "LightPath"))
+        white.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+        background = next(n for n in tree.nodes if n.type == "BACKGROUND" and n != white)
+        tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+        tree.links.new(background.outputs[0], mix.inputs[1])
+        tree.links.new(white.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+        self.export()
+        self.assertEqual(self.line("constant:"), "constant: {color: [0.25, 0.5, 1]}")
+        self.assertEqual(self.line("backdrop: {em"), "backdrop: {emission: {color: [1, 1, 1]}}")
+        self.assertIn("hidden_from: [diffuse, glossy, transmission, shadow]", self.line("{name: Backdrop"))
         self.assertEqual(self.losses(), [])
 
     def test_film(self):

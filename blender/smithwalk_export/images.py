@@ -18,6 +18,7 @@ _SIGNATURES = [
     (b"\xff\xd8\xff", ".jpg"),
     (b"\x76\x2f\x31\x01", ".exr"),
     (b"#?RADIANCE", ".hdr"),
+    (b"#?RGBE", ".hdr"),
 ]
 
 
@@ -205,6 +206,17 @@ def save_image(path, rgba, is_float):
         image.save()
     finally:
         bpy.data.images.remove(image)
+
+
+def mean_color(image):
+    """The mean of an image in scene-linear light, or None without pixels."""
+    pixels = pixels_of(image)
+    if pixels is None or not pixels.size:
+        return None
+    pixels = np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
+    if not image.is_float and color_space(image) != "non_color":
+        pixels = scene_linear(pixels, image.colorspace_settings.name)
+    return tuple(float(c) for c in pixels.mean(axis=(0, 1), dtype=np.float64))
 
 
 def scene_linear(pixels, space):

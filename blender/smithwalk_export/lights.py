@@ -9,6 +9,7 @@ import math
 import bpy
 from mathutils import Vector
 
+from .images import mean_color
 from .meshes import FARTHEST
 from .nodes import Graph, Unknown, describe
 
@@ -175,8 +176,10 @@ class LightWriter:
             tint = graph.evaluate(node.inputs["Color"], source.groups)
             if not isinstance(tint, tuple):
                 what = tint.what if isinstance(tint, Unknown) else f'image "{tint.image.name}"'
-                self.log.warn(where, f"its colour comes from {what}: the power is kept, the pattern is not")
-                tint = (1.0, 1.0, 1.0)
+                mean = None if isinstance(tint, Unknown) else mean_color(tint.image)
+                kept = "the power" if mean is None else "its mean"
+                self.log.warn(where, f"its colour comes from {what}: {kept} is kept, the pattern is not")
+                tint = mean or (1.0, 1.0, 1.0)
             return tuple(t * strength for t in tint)
         if node.type == "MIX_SHADER":
             factor = graph.evaluate(node.inputs[0], source.groups)

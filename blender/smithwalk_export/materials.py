@@ -168,6 +168,17 @@ class MaterialWriter:
         """The largest value of a texture's image, where that holds floats; else 1."""
         return self.images.peaks.get(self.textures[name].get("file"), 1.0) if self.images is not None else 1.0
 
+    def tilt(self, name):
+        """The angle in degrees by which the steepest tenth of the normals of a tangent-space map leans at least."""
+        image, _ = self._heights.get(name, (None, 0.0))
+        if isinstance(image, bpy.types.Image):
+            image = pixels_of(image)
+        if image is None or image.shape[2] < 3:
+            return 0.0
+        some = 2.0 * image[::max(image.shape[0] // 256, 1), ::max(image.shape[1] // 256, 1), :3] - 1.0
+        across = np.hypot(some[..., 0], some[..., 1])
+        return float(np.percentile(np.degrees(np.arctan2(across, np.maximum(some[..., 2], 0.0))), 90.0))
+
     def slope(self, name):
         """The root mean square slope of the values of a texture, per unit of UVs."""
         image, repeats = self._heights.get(name, (None, 0.0))
@@ -410,6 +421,12 @@ class _Surface:
         keys = {"distribution": "beckmann"} if choice == "BECKMANN" else {}
         return {**keys, "scattering": "single"}, False
 
+    def tell_scaling(self, node):
+        """What Cycles does to anisotropic surfaces instead of following light from facet to facet."""
+        if NEW and node.distribution == "MULTI_GGX":
+            self.warn("its Multiscatter GGX is scaled in Cycles by the albedo of an isotropic surface, which "
+                      "loses some light: here none is lost", node)
+
     def tangent(self, node, groups):
         """The `tangent` key of an anisotropic node."""
         source = self.graph.follow(node.inputs["Tangent"], groups)
@@ -440,6 +457,7 @@ class _Surface:
             anisotropy = self.scalar(node, "Anisotropy", groups, -1.0, 1.0)
             if anisotropy != 0.0:
                 keys["anisotropy"] = anisotropy
+                self.tell_scaling(node)
                 rotation = self.turns(node, "Rotation", groups)
                 if rotation != 0.0:
                     keys["rotation"] = rotation
@@ -609,6 +627,7 @@ class _Surface:
                 and node.inputs["Thin Film Thickness"].default_value == 0.0:
             self.idle(node, *_IDLE["Thin Film Thickness"])
         if keys.get("anisotropic"):
+            self.tell_scaling(node)
             rotation = self.turns(node, "Anisotropic Rotation", groups)
             if rotation != 0.0:
                 keys["anisotropic_rotation"] = rotation

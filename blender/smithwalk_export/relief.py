@@ -2,6 +2,7 @@
 
 from .nodes import Unknown, describe
 
+STEEP = 20.0  # degrees that the steepest tenth of a map's normals lean by, above which it is told
 _SPACES = {"TANGENT": "tangent", "OBJECT": "object", "WORLD": "world"}
 
 
@@ -73,6 +74,10 @@ def _normal_map(surface, source):
         surface.warn("its tangents are those of another UV map than its image's: the image's are taken", node)
     normal = {"texture": color["texture"]}
     strength = surface.scalar(node, "Strength", source.groups, 0.0)
+    tilt = surface.writer.tilt(color["texture"]) if space == "tangent" else 0.0
+    if isinstance(strength, float) and tilt * min(strength, 1.0) > STEEP:
+        surface.warn(f"its normals lean by {tilt:.0f}° and more: light that Cycles loses there is kept, and goes "
+                     "elsewhere", node)
     if strength != 1.0:
         normal["strength"] = strength
     if space != "tangent":

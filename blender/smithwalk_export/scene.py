@@ -12,6 +12,7 @@ import time
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from . import cycles, lights, settings, view, yaml
 from .audit import DEFAULTS, Audit
@@ -21,7 +22,7 @@ from .files import Folder
 from .images import ImageWriter
 from .log import Log
 from .materials import MaterialWriter
-from .meshes import LEAN, MeshWriter
+from .meshes import LEAN, MeshWriter, unique_name
 from .world import WorldWriter
 
 FORMAT_VERSION = 1
@@ -236,6 +237,14 @@ class Job:
             log.note("scene", "has no surfaces")
         world, suns = self.world.section(images)
         lamps += suns
+        camera = lights.camera(scene if self.has_camera else _NoCamera, depsgraph, self.audit, log)
+        if self.world.backdrop is not None and not scene.render.film_transparent \
+                and getattr(getattr(self.world.data, "cycles_visibility", None), "camera", True):
+            if "clip" in camera:  # the camera would not see a box that far
+                log.warn(self.world.where, "looks different to the camera than to light in Blender, and the camera "
+                                           "clips: what lights the scene is written")
+            else:
+                objects.append(self._backdrop(files, meshes, _reach(depsgraph)))
         render = scene.render
         border, render.use_border = render.use_border, self.border
         try:
@@ -253,8 +262,7 @@ class Job:
         sections = {
             "smithwalk": FORMAT_VERSION,
             "light_units": lights.light_units(),
-            "camera": lights.camera(scene, depsgraph, self.audit, log) if self.has_camera
-            else lights.camera(_NoCamera, depsgraph, self.audit, log),
+            "camera": camera,
             "film": settings.film(scene, log, None if self._view is None else view.section(self._view, files)),
             "sampling": settings.sampling(scene, depsgraph.view_layer),
             "world": world,
@@ -269,6 +277,19 @@ class Job:
         if options:
             note += ("\n" if note else "") + "Blender's settings as options of `smithwalk render`: " + " ".join(options)
         return sections, note, options
+
+    def _backdrop(self, files, meshes, reach):
+        """A box around all that shines for the camera alone: the world that it sees."""
+        name, material = (unique_name("backdrop", taken) for taken in (meshes.meshes, self.materials.materials))
+        path, file = files.new(f"{name}.obj")
+        corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+        with open(path, "w", encoding="ascii") as f:
+            f.writelines(f"v {x * reach:.9g} {y * reach:.9g} {z * reach:.9g}\n" for x, y, z in corners)
+            f.writelines("f {} {} {} {}\n".format(*face) for face in faces)
+        meshes.meshes[name] = {"file": file}
+        self.materials.materials[material] = {"emission": {"color": [max(c, 0.0) for c in self.world.backdrop]}}
+        return {"name": "Backdrop", "mesh": name, "material": material, "hidden_from": list(lights.RAYS)}
 
     def _objects(self, depsgraph, meshes):
         """Objects and lights, every instance on its own with its world matrix."""
@@ -402,6 +423,13 @@ class Job:
             i, j = (k for k in range(3) if k != "xyz".index(axis))
             if abs(extent[i] - extent[j]) > 1e-3 * size:
                 self.log.warn(where, f"its radial tangent about {axis} ignores that the bounding box is uneven")
+
+
+def _reach(depsgraph):
+    """Half the side of a cube about the origin that holds all, with room, in metres."""
+    corners = [(instance.matrix_world @ Vector(corner)) for instance in depsgraph.object_instances
+               if lights.is_finite(instance.matrix_world) for corner in instance.object.bound_box]
+    return 4.0 * max([1.0] + [abs(c) for corner in corners for c in corner if math.isfinite(c)])
 
 
 class _NoCamera:

@@ -31,6 +31,7 @@ class WorldWriter:
         self.enabled = enabled
         self.progress = progress
         self.panorama = None   # (pixels, sun or None)
+        self.backdrop = None   # the one colour that the camera sees, where that is not what lights the scene
         self.where = f'world "{self.data.name}"' if self.data else "world"
 
     def prepare(self):
@@ -48,6 +49,14 @@ class WorldWriter:
         if stored is not None:
             sun = tuple(float(x) for x in stored["sun"]) if "sun" in stored else None
             self.panorama = (stored["pixels"], sun)
+        if self._sees_camera_rays():
+            key = cache.key("backdrop", cycles.fingerprint(tree))
+            seen = cache.get(key)
+            if seen is None and self.enabled:
+                with self._copy(camera=1.0) as world:
+                    seen = {"pixels": self._panorama(world, 64)}
+                cache.put(key, **seen)
+            self.backdrop = None if seen is None else uniform(seen["pixels"])
 
     def section(self, images):
         """The world section (None: black) and the list of extra lights."""
@@ -73,7 +82,7 @@ class WorldWriter:
                                        f"the viewport colour {[round(c, 3) for c in rgb]} is written")
             return {"constant": {"color": rgb, **seen}}, []
         pixels, sun = self.panorama
-        if self._sees_camera_rays():
+        if self._sees_camera_rays() and self.backdrop is None:
             self.log.warn(self.where, "looks different to the camera than to light in Blender: "
                                       "what lights the scene is written")
         lights = [self._sun(sun, hidden)] if sun else []
@@ -173,8 +182,8 @@ class WorldWriter:
         return stored
 
     @contextlib.contextmanager
-    def _copy(self):
-        """The world as light sees it: no camera rays, visible to all."""
+    def _copy(self, camera=0.0):
+        """The world as light sees it, or for `camera` 1 as the camera does; visible to all."""
         world = self.data.copy()
         before = set(bpy.data.node_groups)
         try:
@@ -187,9 +196,9 @@ class WorldWriter:
                         for link in list(node.outputs["Is Camera Ray"].links):
                             target = link.to_socket
                             tree.links.remove(link)
-                            zero = tree.nodes.new("ShaderNodeValue")
-                            zero.outputs[0].default_value = 0.0
-                            tree.links.new(zero.outputs[0], target)
+                            value = tree.nodes.new("ShaderNodeValue")
+                            value.outputs[0].default_value = camera
+                            tree.links.new(value.outputs[0], target)
             yield world
         finally:
             bpy.data.worlds.remove(world)
