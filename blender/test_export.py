@@ -499,7 +499,9 @@ class ExportTest(unittest.TestCase):
                          ("gain: 2", "transparent: true", "exposure: 0.5"))
         self.assertFalse(os.path.exists(self.path("view.cube")))
         self.scene.view_settings.view_transform = "Filmic"
+        self.scene.cycles.pixel_filter_type = "BLACKMAN_HARRIS"
         self.export()
+        self.assertEqual(self.line("filter:"), "filter: {blackman_harris: {width: 3}}")
         self.assertIn("{lut: view.cube, log2: {offset: 0.00390625", self.line("view:"))
         self.assertEqual(self.losses(), [])
 

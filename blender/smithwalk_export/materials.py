@@ -626,6 +626,9 @@ class _Surface:
         if "Thin Film Thickness" in node.inputs and not node.inputs["Thin Film Thickness"].is_linked \
                 and node.inputs["Thin Film Thickness"].default_value == 0.0:
             self.idle(node, *_IDLE["Thin Film Thickness"])
+        if keys.get("thin_film_thickness") and (keys.get("metallic") or keys.get("transmission_weight")):
+            self.warn("its thin film on metal or glass has the colours of Airy's formula over 32 wavelengths: those "
+                      "of Cycles differ by some percent", node)
         if keys.get("anisotropic"):
             self.tell_scaling(node)
             rotation = self.turns(node, "Anisotropic Rotation", groups)

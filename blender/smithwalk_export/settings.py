@@ -46,7 +46,8 @@ def film(scene, log, view_section=None):
     else:
         if kind != "BLACKMAN_HARRIS":
             log.warn("scene", f"pixel filter {kind.lower()} is written as Blackman-Harris")
-        section["filter"] = {"blackman_harris": {"width": max(cycles.filter_width, 0.01)}}
+        # Cycles' window is twice as wide as the setting says.
+        section["filter"] = {"blackman_harris": {"width": 2.0 * max(cycles.filter_width, 0.01)}}
     if view.exposure(scene) != 0.0:
         section["exposure"] = view.exposure(scene)
     if cycles.film_exposure != 1.0:

@@ -28,8 +28,8 @@ impl PixelFilter {
         Self { inverse: None }
     }
 
-    /// A separable Blackman-Harris window of full width `width` in pixels; 1.5
-    /// is Blender's default.
+    /// A separable Blackman-Harris window of full width `width` in pixels; twice
+    /// what Blender calls its width.
     pub fn blackman_harris(width: f32) -> Self {
         let inverse = (0..=INTERVALS).map(|i| {
             let root = i as f64 / INTERVALS as f64;
