@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _smithwalk
 from ._command import Render, RenderError, SceneMaterial, material, principled, render
+from ._spectrum import rgb_index, rgb_reflectance
 
 __version__: str = _smithwalk.__version__
 __all__ = [
@@ -50,6 +51,8 @@ __all__ = [
     "material",
     "principled",
     "render",
+    "rgb_index",
+    "rgb_reflectance",
     "spherical",
 ]
 

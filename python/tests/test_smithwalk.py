@@ -84,6 +84,30 @@ def test_students_distribution_is_ggx_at_two_and_goes_to_beckmann():
     np.testing.assert_allclose(tails.reflected, 1.0, atol=1e-9)
 
 
+# Gold: photon energies in eV, n and k (Johnson and Christy 1972, "Optical Constants of the Noble Metals", Table I).
+GOLD_EV = np.array([3.25, 3.12, 3.00, 2.88, 2.75, 2.63, 2.50, 2.38, 2.26, 2.14, 2.01, 1.88, 1.76, 1.64])
+GOLD_N = [1.46, 1.47, 1.46, 1.45, 1.38, 1.31, 1.04, 0.62, 0.43, 0.29, 0.21, 0.14, 0.13, 0.14]
+GOLD_K = [1.933, 1.952, 1.958, 1.948, 1.914, 1.849, 1.833, 2.081, 2.455, 2.863, 3.272, 3.697, 4.103, 4.542]
+
+
+def test_gold_is_gold_by_its_spectrum():
+    # A grey metal has its own reflectance and index.
+    np.testing.assert_allclose(smithwalk.rgb_reflectance([380, 780], 1.5, 3.0), (0.5**2 + 3**2) / (2.5**2 + 3**2), rtol=1e-9)
+    grey = smithwalk.rgb_index([380, 780], 1.5, 3.0)
+    np.testing.assert_allclose(grey, [[1.5] * 3, [3.0] * 3], rtol=1e-3)
+    wavelengths = 1239.842 / GOLD_EV
+    color = smithwalk.rgb_reflectance(wavelengths, GOLD_N, GOLD_K)
+    # The renderer's preset, by three wavelengths.
+    eta, k = np.array([[0.183, 0.421, 1.373], [3.424, 2.346, 1.770]])
+    preset = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
+    assert (np.abs(color - preset) < 0.07).all() and color[0] > color[1] > color[2]
+    gold = smithwalk.conductor(distribution="ggx", alpha=0.01, **dict(zip(("eta", "k"), smithwalk.rgb_index(wavelengths, GOLD_N, GOLD_K))))
+    found = gold.albedo(0.999, samples=2_000).reflected
+    np.testing.assert_allclose(found, np.clip(color, 0.0, 0.999), atol=2e-3)
+    with pytest.raises(ValueError, match="wavelengths: expected 400"):
+        smithwalk.rgb_index([500, 600], 1.0, 1.0)
+
+
 def test_a_table_of_the_quadratic_distribution_has_its_closed_form():
     edges = np.linspace(0.0, np.pi / 2, 97)
     middle = (np.cos(edges[:-1]) + np.cos(edges[1:])) / 2
