@@ -45,7 +45,7 @@ _COST = re.compile(
     r"debug_|device$|(use_)?denois|(use_)?adaptive|scrambling|sampling_pattern|auto_scrambling|use_guiding|"
     r"guiding|use_deterministic|use_surface_guiding|surface_guiding|use_volume_guiding|volume_guiding|"
     r"direct_light_sampling|min_light_bounces|min_transparent|light_sampling_threshold|use_light_tree|"
-    r"tile_size|use_auto_tile|texture_limit|feature_set|shading_system|sample_offset|use_sample_subset|"
+    r"use_compositor_|tile_size|use_auto_tile|texture_limit|feature_set|shading_system|sample_offset|use_sample_subset|"
     r"sample_subset|use_persistent|threads|sampling_method|sample_map_resolution|emission_sampling|"
     r"sample_as_light|use_multiple_importance|use_mis|is_shadow_linking|offscreen_dicing|"
     r"use_layer_samples|use_pass|pass_|sample_count|use_animated_seed|fast_gi_method|homogeneous|"
@@ -155,8 +155,6 @@ class Defaults:
             self._structs["Scene"] = harvest(scene)
             self._structs["ViewLayer"] = harvest(scene.view_layers[0])
             collection = bpy.data.collections.new("smithwalk defaults")
-            scene.collection.children.link(collection)
-            self._structs["LayerCollection"] = harvest(scene.view_layers[0].layer_collection.children[0])
             self._structs["Collection"] = harvest(collection)
             made.append((bpy.data.collections, collection))
             for store, kind in ((bpy.data.cameras, "Camera"), (bpy.data.worlds, "World"),
