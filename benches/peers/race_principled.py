@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Races layers against Cycles' Principled node: spheres under a sky with a sun, in one run.
 
-    python3 benches/peers/race_principled.py -o DIR --bpy DIR [--smithwalk FILE] [--docs]
+    python3 benches/peers/race_principled.py -o DIR --bpy DIR [--spheres NAME,...] [--smithwalk FILE] [--docs]
 
 Error and efficiency are those of race.py. One thread for everyone, CPU seconds. The scenes are
 those of blender/scenes/principled_spheres.py, as the exporter writes them; `openpbr` stands beside
@@ -51,18 +51,21 @@ def main():
     parser.add_argument("-o", "--output", required=True, help="folder for scenes and images")
     parser.add_argument("--smithwalk", default=os.path.join(race.ROOT, "target", "release", "smithwalk"))
     parser.add_argument("--bpy", required=True, help="PYTHONPATH of the bpy module, 5.0")
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--reference-spp", type=int, default=512, help="of each of the two")
-    parser.add_argument("--seeds", type=int, default=4, help="images to average over")
+    parser.add_argument("--spheres", default=",".join(SPHERES), help="comma-separated")
+    parser.add_argument("--side", type=int, default=64, help="of images, in pixels")
+    parser.add_argument("--spp", type=int, default=96)
+    parser.add_argument("--reference-spp", type=int, default=192, help="of each of the two")
+    parser.add_argument("--seeds", type=int, default=3, help="images to average over")
     parser.add_argument("--docs", action="store_true", help="write the section of docs/layers.md")
     args = parser.parse_args()
     args.spp, args.output = [args.spp], os.path.abspath(args.output)
-    run([sys.executable, os.path.join(race.ROOT, "blender", "scenes", "principled_spheres.py"), args.output],
+    run([sys.executable, os.path.join(race.ROOT, "blender", "scenes", "principled_spheres.py"), args.output,
+         str(args.side)],
         PYTHONPATH=args.bpy)
 
     lines = ["| sphere of | renderer | CPU s | relMSE | relMSE × CPU s | spread | Cycles over this |", "|---" * 7 + "|"]
     version = ""
-    for scene in SPHERES:
+    for scene in args.spheres.split(","):
         costs = {}
         for contender in (cycles(args, scene), *ours(args, scene)):
             said, rows = race.race(args, scene, contender)
@@ -77,7 +80,7 @@ def main():
                 f"| {costs['Cycles'] / costs[contender.name]:.2f} |")
             print(lines[-1], flush=True)
     text = (f"Each against converged images of its own, one run of `benches/peers/race_principled.py`: {args.seeds} "
-            f"images of 128 × 128 at {args.spp[0]} samples per pixel, one thread, Cycles of {version}. The last column is "
+            f"images of {args.side} × {args.side} at {args.spp[0]} samples per pixel, one thread, Cycles of {version}. The last column is "
             "Cycles' CPU time to equal error over that of the row; above 1 this renderer leads.\n\n" + "\n".join(lines))
     if args.docs:
         section.replace("Beside Cycles' Principled", text, os.path.join(race.ROOT, "docs", "layers.md"),

@@ -1,9 +1,9 @@
 """Builds spheres of Blender's Principled node under a sky with a sun, for benches/peers/race_principled.py.
 
-    PYTHONPATH=<bpy> python3 blender/scenes/principled_spheres.py OUT_DIR
+    PYTHONPATH=<bpy> python3 blender/scenes/principled_spheres.py OUT_DIR SIDE
 
 Writes NAME.blend and, by the exporter, NAME/scene.yaml for each of SPHERES, and
-OUT_DIR/sky.exr. One thread, so that nobody's CPU time holds waiting.
+OUT_DIR/sky.exr; SIDE is in pixels. One thread, so that nobody's CPU time holds waiting.
 """
 
 import math
@@ -46,9 +46,9 @@ def sky(path):
     bpy.data.images.remove(image)
 
 
-def build(sockets, sky_path):
-    """128 × 128, 8 bounces; a sphere on a grey plane."""
-    scene = common.empty_scene(128, 128, bounces=8)
+def build(sockets, side, sky_path):
+    """8 bounces; a sphere on a grey plane."""
+    scene = common.empty_scene(side, side, bounces=8)
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     ball = common.sphere("Ball", (0.0, 0.0, 1.0), segments=128, rings=64)
     ball.data.materials.append(common.material("Ball", "ShaderNodeBsdfPrincipled", **sockets)[0])
@@ -73,7 +73,7 @@ def main(args):
     sky_path = os.path.join(folder, "sky.exr")
     sky(sky_path)
     for name, sockets in SPHERES.items():
-        scene = build(sockets, sky_path)
+        scene = build(sockets, int(args[1]), sky_path)
         export(scene, os.path.join(folder, name))
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, name + ".blend"))
     return 0
