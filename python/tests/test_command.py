@@ -63,10 +63,14 @@ def test_ctrl_c_and_exceptions_end_a_render():
 
     with pytest.raises(Enough):
         smithwalk.render(FURNACE, time=60, settings=SMALL, progress=stop, command=COMMAND)
-    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        smithwalk.render(FURNACE, time=60, settings=SMALL, command=COMMAND)
+    # Shells start programs in the background deaf to Ctrl-C.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            smithwalk.render(FURNACE, time=60, settings=SMALL, command=COMMAND)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @needs_command

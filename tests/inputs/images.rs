@@ -614,11 +614,15 @@ fn sixteen_bits_take_two_bytes() {
     assert_eq!(Texture::memory(&[texture]), 12);
 }
 
-/// What the fuzzer has found: a decoder that panics.
+/// What the fuzzer has found: decoders that panic, the second where overflows are
+/// checked, as they are here.
 #[test]
 fn decoders_that_panic_end_nothing_else() {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/fuzz/sample_format.tiff");
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/fuzz");
     let budget = smithwalk::memory::Budget::new(1 << 30);
+    let file = data.join("sample_format.tiff");
     let error = smithwalk::texture::load_environment(&file, &budget).unwrap_err();
     assert!(error.to_string().contains("its decoder gave up"), "{error}");
+    let read = smithwalk::image::read_exr(&data.join("b44.exr"));
+    assert_eq!(read.is_err(), cfg!(debug_assertions));
 }
