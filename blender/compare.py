@@ -16,7 +16,6 @@ import html
 import json
 import math
 import os
-import shutil
 import subprocess
 import sys
 
@@ -28,21 +27,13 @@ try:
     import pinned_cycles
 except ImportError as missing:
     sys.exit(f"compare.py: {missing}: run it by `blender -b FILE --python`, or with the bpy module")
+from command import program  # noqa: E402
 from smithwalk_export import exr  # noqa: E402
 from smithwalk_export.log import APPROXIMATE, GENERAL, NOTE, WRONG  # noqa: E402
 from smithwalk_export.scene import export  # noqa: E402
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _WITHIN = 2.5  # standard deviations that count as agreement: 98.8 % of pixels of pure noise
-
-
-def program():
-    """The renderer's path."""
-    built = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release", "smithwalk")
-    for path in (os.environ.get("SMITHWALK"), built, shutil.which("smithwalk")):
-        if path and os.path.isfile(path):
-            return path
-    raise SystemExit("compare.py: the smithwalk program was not found: set SMITHWALK")
 
 
 def render_cycles(scene, spp):

@@ -13,7 +13,6 @@ with 1 where a case is silent or refused.
 import argparse
 import json
 import os
-import shutil
 import subprocess
 import sys
 
@@ -22,19 +21,11 @@ import numpy as np
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "smithwalk_export"))
 
 import exr  # noqa: E402
+from command import program  # noqa: E402
 
 BIAS, LOOK = 0.006, 0.012
 # What the exporter says of every file is no explanation of a difference.
 _ALWAYS = ("have no counterpart", "--denoise")
-
-
-def program():
-    """The renderer's path: SMITHWALK, the built one, or the PATH's."""
-    built = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "target", "release", "smithwalk")
-    for path in (os.environ.get("SMITHWALK"), built, shutil.which("smithwalk")):
-        if path and os.path.isfile(path):
-            return path
-    raise SystemExit("judge_cases.py: the smithwalk program was not found: set SMITHWALK")
 
 
 def blocks(pixels, size=4):

@@ -168,11 +168,14 @@ class MaterialWriter:
         """The largest value of a texture's image, where that holds floats; else 1."""
         return self.images.peaks.get(self.textures[name].get("file"), 1.0) if self.images is not None else 1.0
 
+    def _stored(self, name):
+        """A texture's pixels, if it has any, and how often it repeats."""
+        image, repeats = self._heights.get(name, (None, 0.0))
+        return (pixels_of(image) if isinstance(image, bpy.types.Image) else image), repeats
+
     def tilt(self, name):
         """The angle in degrees by which the steepest tenth of the normals of a tangent-space map leans at least."""
-        image, _ = self._heights.get(name, (None, 0.0))
-        if isinstance(image, bpy.types.Image):
-            image = pixels_of(image)
+        image, _ = self._stored(name)
         if image is None or image.shape[2] < 3:
             return 0.0
         some = 2.0 * image[::max(image.shape[0] // 256, 1), ::max(image.shape[1] // 256, 1), :3] - 1.0
@@ -181,9 +184,7 @@ class MaterialWriter:
 
     def slope(self, name):
         """The root mean square slope of the values of a texture, per unit of UVs."""
-        image, repeats = self._heights.get(name, (None, 0.0))
-        if isinstance(image, bpy.types.Image):
-            image = pixels_of(image)
+        image, repeats = self._stored(name)
         if image is None or image.shape[1] < 2:
             return 0.0
         rows = image[::max(image.shape[0] // 256, 1), :, :3].mean(axis=2)
