@@ -1,11 +1,12 @@
 #!/bin/sh
 # Rebuild scenes/: .blend by script (Blender 3.4), export, Cycles references.
 #
-#   blender/make_scenes.sh [gold_sphere|suzanne|sphere_rows|furnace|interior|rough_glass|brushed_metal|gallery]...
+#   blender/make_scenes.sh [gold_sphere|suzanne|sphere_rows|furnace|interior|rough_glass|brushed_metal|gallery
+#                           |product_shot|daylight_room|many_lamps]...
 #
-# Needs `blender` 3.4 on PATH, and for the references of 4.5 BPY45, a folder
-# with the bpy 4.5 module (pip install --no-deps --target DIR bpy==4.5.15, and
-# numpy < 2 beside it); without BPY45 those are left as they are.
+# Needs `blender` 3.4 on PATH, and for the references of 4.5 and the last three
+# scenes BPY45, a folder with the bpy 4.5 module (pip install --no-deps --target
+# DIR bpy==4.5.15, and numpy < 2 beside it); without BPY45 those are left as they are.
 # The .blend files go to out/blend and are not committed.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -13,13 +14,24 @@ root=$(dirname "$here")
 blends=$root/out/blend
 mkdir -p "$blends"
 
-build() { # scene
-    nice blender -b --factory-startup --python "$here/scenes/$1.py" -- "$blends/$1.blend"
+clear() { # scene
     mkdir -p "$root/scenes/$1"
     # All but the references comes from the export, which writes over no file that
     # an earlier one has not listed.
     find "$root/scenes/$1" -maxdepth 1 -type f ! -name 'cycles_*' -delete
+}
+
+build() { # scene
+    nice blender -b --factory-startup --python "$here/scenes/$1.py" -- "$blends/$1.blend"
+    clear "$1"
     nice blender -b "$blends/$1.blend" --python "$here/export.py" -- "$root/scenes/$1"
+}
+
+build45() { # scene: with the Principled node of 4.5
+    [ -n "${BPY45:-}" ] || { echo "BPY45 is not set: $1 left as it is" >&2; return 0; }
+    PYTHONPATH=$BPY45 nice python3 "$here/scenes/$1.py" "$blends/$1.blend"
+    clear "$1"
+    PYTHONPATH=$BPY45 nice python3 "$here/export.py" "$blends/$1.blend" "$root/scenes/$1"
 }
 
 cycles34() { # scene name options...: scenes/SCENE/cycles_3.4_NAME.{exr,json}
@@ -70,9 +82,13 @@ interior() { build interior; }
 rough_glass() { build rough_glass; }
 brushed_metal() { build brushed_metal; }
 gallery() { build gallery; }
+product_shot() { build45 product_shot; }
+daylight_room() { build45 daylight_room; }
+many_lamps() { build45 many_lamps; }
 
 if [ $# -eq 0 ]; then
-    set -- gold_sphere suzanne sphere_rows furnace interior rough_glass brushed_metal gallery
+    set -- gold_sphere suzanne sphere_rows furnace interior rough_glass brushed_metal gallery \
+        product_shot daylight_room many_lamps
 fi
 for scene; do
     "$scene"

@@ -1,73 +1,59 @@
 """Renders jobs with Mitsuba 3; a worker of race.py.
 
-    python3 benches/peers/mitsuba_worker.py SCENE_DIR JOBS.json RESULTS.json VARIANT SAMPLER
+    python3 benches/peers/mitsuba_worker.py SCENE_DIR JOBS.json RESULTS.json PERCENT VARIANT SAMPLER
 
 Translates SCENE_DIR/scene.yaml as far as the scenes of the race need it, and
 says on standard output what it leaves out. What differs: Mitsuba scatters once
 and masks by a product of two functions; a glass colour counts once, not at
-every facet; `roughconductor` takes no rotation of its tangent; lamps hide what
-lies behind them. Times are those of rendering alone; kernels of the llvm
-variants are compiled before, by a render with another seed. Needs PyYAML.
+every facet; `roughconductor` takes no rotation of its tangent; `principled` is
+Disney's of 2012; a pane is a sheet with two faces, and where there is one the
+integrator is `volpath`, which alone lets light samples through; lamps hide what
+lies behind them, and the sun is a disk 10 km away. Times are those of rendering
+alone; kernels of the llvm variants are compiled before, by a render with another
+seed. Needs PyYAML.
 """
 
 import json
 import math
-import os
-import resource
 import sys
 import time
 
 import mitsuba as mi
 import numpy as np
-import yaml
+
+from scene_file import SceneFile, cpu_seconds, matrix, rgb
+
+SUN = 1e4  # metres
 
 
-def cpu_seconds():
-    """Of all threads of this process."""
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
+def spectrum(color):
+    """A colour of the scene file, a list or one number."""
+    return {"type": "rgb", "value": rgb(color)}
 
 
-def rgb(color, factor=1.0):
-    """A colour of the scene file, a list or one number, times `factor`."""
-    color = color if isinstance(color, list) else [color] * 3
-    return {"type": "rgb", "value": [factor * c for c in color]}
+def stored(path):
+    """An image's values as they are stored."""
+    return np.array(mi.Bitmap(path))
 
 
-def matrix(entry):
-    """The 4 × 4 array of a transform, as the exporter writes it."""
-    return np.array(entry["transform"]["matrix"], dtype=np.float64)
-
-
-def euler(degrees):
-    """The rotation of Blender's Euler XYZ angles, 3 × 3."""
-    x, y, z = (math.radians(d) for d in degrees)
-    rx = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
-    ry = np.array([[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]])
-    rz = np.array([[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]])
-    return rz @ ry @ rx
-
-
-class Translation:
+class Translation(SceneFile):
     """A scene file as a dictionary of Mitsuba's."""
 
-    def __init__(self, folder, sampler):
-        self.folder, self.sampler = folder, sampler
-        with open(os.path.join(folder, "scene.yaml"), encoding="utf-8") as file:
-            self.file = yaml.safe_load(file)
-        assert self.file["light_units"] == "cycles_3"
+    def __init__(self, folder, sampler, percent=100):
+        super().__init__(folder, percent)
+        self.sampler = sampler
 
     def scene(self):
         """All of it."""
-        bounces = self.file["sampling"]["max_bounces"]
+        panes = any("mix" in material for material in self.file["materials"].values())
         # Depth 2 is what Blender counts as no bounce: direct light.
-        scene = {"type": "scene", "integrator": {"type": "path", "max_depth": bounces + 2},
-                 "sensor": self.sensor()}
+        scene = {"type": "scene", "sensor": self.sensor(),
+                 "integrator": {"type": "volpath" if panes else "path", "max_depth": self.bounces + 2}}
         world = self.world()
         if world:
-            scene["world"] = world
-        for index, light in enumerate(self.file.get("lights", [])):
-            scene[f"light{index}"] = self.area_light(light["area"])
+            scene["world"] = self.background(*world)
+        for index, light in enumerate(self.lights()):
+            scene[f"light{index}"] = self.lamp(*light)
         for index, entry in enumerate(self.file["objects"]):
             scene[f"object{index}"] = {
                 "type": "obj", "filename": self.path(self.file["meshes"][entry["mesh"]]),
@@ -76,103 +62,92 @@ class Translation:
             }
         return scene
 
-    def path(self, entry):
-        """The file that a mesh, a texture or the world names."""
-        return os.path.join(self.folder, entry["file"])
-
     def sensor(self):
         """Blender's camera looks along −z, Mitsuba's along +z with x to the left."""
-        camera, film = self.file["camera"], self.file["film"]
-        lens = camera["projection"]["perspective"]
         return {
-            "type": "perspective", "fov_axis": "larger",
-            "fov": 2.0 * math.degrees(math.atan(lens["sensor_width"] / (2.0 * lens["lens"]))),
-            "to_world": mi.ScalarTransform4f(matrix(camera) @ np.diag([-1.0, 1.0, -1.0, 1.0])),
-            "film": {"type": "hdrfilm", "width": film["width"], "height": film["height"],
+            "type": "perspective", "fov_axis": "larger", "fov": self.fov,
+            "to_world": mi.ScalarTransform4f(matrix(self.file["camera"]) @ np.diag([-1.0, 1.0, -1.0, 1.0])),
+            "film": {"type": "hdrfilm", "width": self.width, "height": self.height,
                      "pixel_format": "rgb", "component_format": "float32", "rfilter": {"type": "box"}},
             "sampler": {"type": self.sampler},
         }
 
-    def world(self):
-        """A constant or an environment map; None if black."""
-        world = self.file.get("world", {})
-        if "constant" in world:
-            constant = world["constant"]
-            if constant["strength"] == 0.0:
-                return None
-            return {"type": "constant", "radiance": rgb(constant["color"], constant["strength"])}
-        if "environment" not in world:
-            return None
-        environment = world["environment"]
+    def background(self, kind, what, rotation=None):
+        """A constant or an environment map."""
+        if kind == "constant":
+            return {"type": "constant", "radiance": spectrum(what)}
         # Blender looks d' = R·d up at u = 1/2 − atan2(d'y, d'x)/2π, Mitsuba its
         # local direction at u = atan2(x, −z)/2π: x, y, z are d'y, d'z, d'x.
         axes = np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]], dtype=np.float64)
         to_world = np.eye(4)
-        to_world[:3, :3] = (axes @ euler(environment["rotation"])).T
-        return {"type": "envmap", "filename": self.path(environment), "scale": environment["strength"],
+        to_world[:3, :3] = (axes @ rotation).T
+        return {"type": "envmap", "filename": self.path(what), "scale": what["strength"],
                 "to_world": mi.ScalarTransform4f(to_world)}
 
     @staticmethod
-    def area_light(light):
-        """Radiance P/(4A) along the light's −z, as in Blender 3.4."""
-        shape = light["shape"]["rectangle"]
-        size = [shape["width"] / 2.0, shape["height"] / 2.0, 1.0]
+    def lamp(kind, place, radiance, sizes):
+        """A shape that shines: a rectangle or a disk along the light's −z, or a sphere."""
+        emitter = {"type": "area", "radiance": spectrum(radiance)}
+        if kind == "point":
+            return {"type": "sphere", "center": place[:3, 3].tolist(), "radius": sizes, "emitter": emitter}
         turn = np.diag([1.0, -1.0, -1.0, 1.0])
-        return {
-            "type": "rectangle",
-            "to_world": mi.ScalarTransform4f(matrix(light) @ turn @ np.diag([*size, 1.0])),
-            "emitter": {"type": "area", "radiance": rgb(
-                light.get("color", 1.0), light["power"] / (4.0 * shape["width"] * shape["height"]))},
-        }
+        if kind == "area":
+            size = np.diag([sizes[0] / 2.0, sizes[1] / 2.0, 1.0, 1.0])
+            return {"type": "rectangle", "to_world": mi.ScalarTransform4f(place @ turn @ size), "emitter": emitter}
+        far = place.copy()
+        far[:3, 3] = SUN * place[:3, 2]
+        size = SUN * math.tan(sizes)
+        return {"type": "disk", "to_world": mi.ScalarTransform4f(far @ turn @ np.diag([size, size, 1.0, 1.0])),
+                "emitter": emitter}
 
     def bsdf(self, name):
-        """Lambert, or single-scattering GGX."""
+        """Lambert, single-scattering GGX, Disney's, or a pane."""
         (kind, keys), = self.file["materials"][name].items()
         if kind == "diffuse":
-            return {"type": "diffuse", "reflectance": rgb(keys["color"])}
-        alpha_u, alpha_v = self.alphas(keys)
+            return {"type": "diffuse", "reflectance": spectrum(keys["color"])}
+        if kind == "mix":
+            return {"type": "thindielectric", "int_ior": keys["factor"]["fresnel"]["ior"], "ext_ior": 1.0}
+        if kind == "principled":
+            return {"type": "twosided", "bsdf": {
+                "type": "principled", "base_color": self.texture(keys.get("base_color", 0.8), spectrum),
+                "roughness": self.texture(keys.get("roughness", 0.5), float), "metallic": float(keys.get("metallic", 0.0)),
+                "specular": 0.5}}
+        alpha_u, alpha_v = self.alphas(keys, stored)
         if kind == "conductor":
             if "rotation" in keys:
                 print(f"{name}: the rotation of the tangent is left out")
+            if np.ndim(alpha_u):
+                alpha_u, alpha_v = (self.bitmap(keys["roughness"], values, True) for values in (alpha_u, alpha_v))
             return {"type": "roughconductor", "material": "none", "distribution": "ggx",
-                    "alpha_u": alpha_u, "alpha_v": alpha_v, "specular_reflectance": rgb(keys["color"])}
+                    "alpha_u": alpha_u, "alpha_v": alpha_v, "specular_reflectance": spectrum(keys["color"])}
         assert kind == "dielectric", kind
-        color = keys.get("color", 1.0)
+        color = spectrum(keys.get("color", 1.0))
         return {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha_u,
                 "int_ior": keys["ior"], "ext_ior": 1.0,
-                "specular_reflectance": rgb(color), "specular_transmittance": rgb(color)}
+                "specular_reflectance": color, "specular_transmittance": color}
 
-    def alphas(self, keys):
-        """α along u and v from roughness and anisotropy (0 to 1), constant or textured."""
-        roughness = self.values(keys["roughness"])
-        anisotropy = self.values(keys.get("anisotropy", 0.0))
-        alpha = roughness ** 2
-        along = alpha * (1.0 - anisotropy)
-        across = np.minimum(alpha / np.maximum(1.0 - anisotropy, 1e-6), 1.0)
-        if np.ndim(along) == 0:
-            return float(along), float(across)
-        scale = self.file["textures"][keys["roughness"]["texture"]].get("scale", [1.0, 1.0])
-        return tuple({
-            "type": "bitmap", "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat",
-            "bitmap": mi.Bitmap(values.astype(np.float32)[:, :, None]),
-            "to_uv": mi.ScalarTransform3f().scale(scale),
-        } for values in (along, across))
-
-    def values(self, value):
-        """A number, or the first channel of a grey texture as it is stored."""
+    def texture(self, value, constant):
+        """A value that may be a texture."""
         if not isinstance(value, dict):
-            return value
-        bitmap = mi.Bitmap(self.path(self.file["textures"][value["texture"]]))
-        pixels = np.array(bitmap).astype(np.float64) / 255.0
-        return pixels if pixels.ndim == 2 else pixels[:, :, 0]
+            return constant(value)
+        entry = self.file["textures"][value["texture"]]
+        if entry["color_space"] == "srgb":
+            return self.bitmap(value, stored(self.path(entry)), False)
+        return self.bitmap(value, self.number(value, stored), True)
+
+    def bitmap(self, value, values, raw):
+        """Pixels where a texture's would be; `raw`: not to be decoded."""
+        values = values[:, :, None].astype(np.float32) if raw else values
+        return {"type": "bitmap", "raw": raw, "filter_type": "bilinear", "wrap_mode": "repeat",
+                "bitmap": mi.Bitmap(values), "to_uv": mi.ScalarTransform3f().scale(self.scale(value))}
 
 
-def main(folder, jobs, results, variant, sampler):
+def main(folder, jobs, results, percent, variant, sampler):
     """Every job in turn."""
     mi.set_variant(variant)
     import drjit as dr
 
-    scene = mi.load_dict(Translation(folder, sampler).scene())
+    scene = mi.load_dict(Translation(folder, sampler, int(percent)).scene())
     with open(jobs, encoding="utf-8") as file:
         jobs = json.load(file)
 

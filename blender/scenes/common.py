@@ -46,11 +46,11 @@ def camera(scene, location, target, fov):
 
 
 def area_light(scene, name, location, target, size, watts, color=(1.0, 1.0, 1.0)):
-    """A rectangle light; `size` is (width, height) in metres."""
+    """A rectangle light; `size` is (width, height) in metres, `watts` are Blender 3's."""
     data = bpy.data.lights.new(name, "AREA")
     data.shape = "RECTANGLE"
     data.size, data.size_y = size
-    data.energy = watts
+    data.energy = watts if bpy.app.version < (4, 0, 0) else watts * math.pi / 4.0  # the same radiance
     data.color = color
     ob = bpy.data.objects.new(name, data)
     ob.location = location
@@ -92,6 +92,56 @@ def box(name, location, size, bevel=0.0):
     return ob
 
 
+def mesh(name, vertices, faces, mat):
+    """An object of vertices and faces, at the origin."""
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(vertices, [], faces)
+    data.materials.append(mat)
+    ob = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(ob)
+    return ob
+
+
+def quad(name, corners, mat):
+    """A quadrilateral."""
+    return mesh(name, corners, [(0, 1, 2, 3)], mat)
+
+
+def turned(name, location, outline, mat, segments=48):
+    """A solid of revolution about z; `outline` holds (radius, height), from axis to axis.
+
+    Smooth but where the outline turns by more than 30°.
+    """
+    runs, before = [[Vector(outline[0])]], None
+    for a, b in zip(map(Vector, outline), map(Vector, outline[1:])):
+        if before and abs(before.angle_signed(b - a)) > math.radians(30.0):
+            runs.append([a])  # a ring of its own: normals are not shared
+        runs[-1].append(b)
+        before = b - a
+    vertices, faces = [], []
+    for run in runs:
+        below = None
+        for radius, z in run:
+            first, count = len(vertices), segments if radius > 0.0 else 1
+            turns = (2.0 * math.pi * s / segments for s in range(count))
+            vertices += [(radius * math.cos(turn), radius * math.sin(turn), z) for turn in turns]
+            ring = [first + s % count for s in range(segments + 1)]
+            for s in range(segments if below else 0):
+                corners = below[s], below[s + 1], ring[s + 1], ring[s]
+                faces.append(tuple(dict.fromkeys(corners)))
+            below = ring
+    ob = mesh(name, vertices, faces, mat)
+    ob.location = location
+    return smooth(ob)
+
+
+def rounded(radius, height, edge, steps=5):
+    """The outline of a cylinder that stands on 0, its edges rounded off."""
+    corner = [(math.sin(a), math.cos(a)) for a in (0.5 * math.pi * k / steps for k in range(steps + 1))]
+    below = [(radius - edge + edge * x, edge - edge * y) for x, y in corner]
+    return [(0.0, 0.0), *below, *((r, height - z) for r, z in reversed(below)), (0.0, height)]
+
+
 def smooth(ob):
     """Interpolate the normals of all faces."""
     for polygon in ob.data.polygons:
@@ -128,6 +178,13 @@ def glass(name, roughness, ior=1.5, color=(1.0, 1.0, 1.0)):
     """Multiscatter GGX glass."""
     mat, node = material(name, "ShaderNodeBsdfGlass", Color=color, Roughness=roughness, IOR=ior)
     node.distribution = "MULTI_GGX"
+    return mat
+
+
+def principled(name, color, roughness=0.5, metallic=0.0):
+    """The Principled node, all other sockets as they come."""
+    mat, node = material(name, "ShaderNodeBsdfPrincipled", Base_Color=color, Roughness=roughness, Metallic=metallic)
+    node.distribution = "MULTI_GGX"  # what new nodes have since 4.0
     return mat
 
 

@@ -15,28 +15,19 @@ import common  # noqa: E402
 WIDTH, DEPTH, HEIGHT = 4.0, 5.0, 2.8
 
 
-def wall(name, corners, mat):
-    """A quadrilateral."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
-    mesh.materials.append(mat)
-    ob = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(ob)
-
-
 def room():
     """Six walls, the left one terracotta, the right one blue."""
     x, y, z = WIDTH / 2, DEPTH / 2, HEIGHT
     white = common.diffuse("Plaster", (0.76, 0.75, 0.72))
-    wall("Floor", [(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)],
-         common.diffuse("Floorboards", (0.38, 0.3, 0.22)))
-    wall("Ceiling", [(-x, -y, z), (-x, y, z), (x, y, z), (x, -y, z)], white)
-    wall("Back", [(-x, y, 0), (x, y, 0), (x, y, z), (-x, y, z)], white)
-    wall("Front", [(-x, -y, 0), (-x, -y, z), (x, -y, z), (x, -y, 0)], white)
-    wall("Left", [(-x, -y, 0), (-x, y, 0), (-x, y, z), (-x, -y, z)],
-         common.diffuse("Terracotta", (0.62, 0.25, 0.14)))
-    wall("Right", [(x, -y, 0), (x, -y, z), (x, y, z), (x, y, 0)],
-         common.diffuse("Blue", (0.18, 0.32, 0.55)))
+    common.quad("Floor", [(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)],
+                common.diffuse("Floorboards", (0.38, 0.3, 0.22)))
+    common.quad("Ceiling", [(-x, -y, z), (-x, y, z), (x, y, z), (x, -y, z)], white)
+    common.quad("Back", [(-x, y, 0), (x, y, 0), (x, y, z), (-x, y, z)], white)
+    common.quad("Front", [(-x, -y, 0), (-x, -y, z), (x, -y, z), (x, -y, 0)], white)
+    common.quad("Left", [(-x, -y, 0), (-x, y, 0), (-x, y, z), (-x, -y, z)],
+                common.diffuse("Terracotta", (0.62, 0.25, 0.14)))
+    common.quad("Right", [(x, -y, 0), (x, -y, z), (x, y, z), (x, y, 0)],
+                common.diffuse("Blue", (0.18, 0.32, 0.55)))
 
 
 def uplight(scene):

@@ -56,26 +56,31 @@ def studio(width=512, height=256):
     return radiance
 
 
-def environment_image(scene):
-    """The studio as a packed EXR of halves, which compresses to a small file."""
+def environment_image(scene, name, radiance):
+    """Radiance as a packed EXR of halves, which compresses to a small file."""
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "studio.exr")
-        pinned_cycles.write_exr(scene, path, studio().astype(np.float32), half=True)
+        path = os.path.join(folder, f"{name}.exr")
+        pinned_cycles.write_exr(scene, path, radiance.astype(np.float32), half=True)
         img = bpy.data.images.load(path)
         img.pack()
     return img
 
 
-def studio_world(scene):
-    """The studio as an environment texture, turned by a Mapping node."""
+def environment_world(scene, name, radiance, degrees=0.0):
+    """An image as an environment texture, turned about z by a Mapping node."""
     common.constant_world(scene, (0.0, 0.0, 0.0), 1.0)
     tree = scene.world.node_tree
     background = next(n for n in tree.nodes if n.type == "BACKGROUND")
     lookup = tree.nodes.new("ShaderNodeTexEnvironment")
-    lookup.image = environment_image(scene)
+    lookup.image = environment_image(scene, name, radiance)
     mapping = tree.nodes.new("ShaderNodeMapping")
-    mapping.inputs["Rotation"].default_value = (0.0, 0.0, math.radians(20.0))
+    mapping.inputs["Rotation"].default_value = (0.0, 0.0, math.radians(degrees))
     coordinates = tree.nodes.new("ShaderNodeTexCoord")
     tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
     tree.links.new(mapping.outputs[0], lookup.inputs[0])
     tree.links.new(lookup.outputs["Color"], background.inputs["Color"])
+
+
+def studio_world(scene):
+    """The studio as the world."""
+    environment_world(scene, "studio", studio(), 20.0)
