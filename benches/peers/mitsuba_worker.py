@@ -1,6 +1,6 @@
 """Renders jobs with Mitsuba 3; a worker of race.py.
 
-    python3 benches/peers/mitsuba_worker.py SCENE_DIR JOBS.json RESULTS.json PERCENT VARIANT SAMPLER
+    python3 benches/peers/mitsuba_worker.py SCENE_DIR JOBS.json RESULTS.json VARIANT SAMPLER
 
 Translates SCENE_DIR/scene.yaml as far as the scenes of the race need it, and
 says on standard output what it leaves out. What differs: Mitsuba scatters once
@@ -142,14 +142,14 @@ class Translation(SceneFile):
                 "bitmap": mi.Bitmap(values), "to_uv": mi.ScalarTransform3f().scale(self.scale(value))}
 
 
-def main(folder, jobs, results, percent, variant, sampler):
+def main(folder, jobs, results, variant, sampler):
     """Every job in turn."""
     mi.set_variant(variant)
     import drjit as dr
 
-    scene = mi.load_dict(Translation(folder, sampler, int(percent)).scene())
     with open(jobs, encoding="utf-8") as file:
         jobs = json.load(file)
+    scene = mi.load_dict(Translation(folder, sampler, jobs[0].get("percent", 100)).scene())
 
     def render(spp, seed):
         # A wavefront of more than 2³² samples does not exist: references come
