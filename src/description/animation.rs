@@ -1,9 +1,10 @@
 //! Scenes that move: one scene file, and for each frame a small file of what is
 //! otherwise in it.
 
-use super::document::{Kind, Node, Scalar, parse};
+use super::document::parse;
 use super::problem::{Problem, Problems, Sources};
 use super::read::describe;
+use super::tree::{Kind, Node, Scalar};
 use super::{Description, Transform, folder_of, overrides, read_text, tree_of, without_mark};
 use crate::numbered::Numbered;
 use std::collections::BTreeSet;

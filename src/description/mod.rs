@@ -24,6 +24,7 @@ mod rough;
 mod settings;
 mod texture;
 mod transform;
+mod tree;
 mod validate;
 mod value;
 
@@ -54,8 +55,8 @@ pub use value::{Color, Scalar};
 
 pub(crate) use problem::nearest;
 
-use document::Node;
 use problem::Sources;
+use tree::Node;
 
 use crate::memory::Budget;
 use crate::numbered::Numbered;

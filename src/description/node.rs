@@ -1,6 +1,6 @@
 //! Nodes of a YAML file, and how typed values are read from them.
 
-use super::document::{Key, Kind, Node, Scalar};
+use super::tree::{Key, Kind, Node, Scalar};
 use serde::de::value::{BorrowedStrDeserializer, Error};
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error as _, MapAccess, SeqAccess, Unexpected,

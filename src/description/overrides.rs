@@ -1,9 +1,10 @@
 //! Values in place of a scene's, by their dotted path: on the command line as
 //! `path=value`, in the files of frames.
 
-use super::document::{Key, Kind, MAX_DEPTH, Mapping, Node, Scalar, dotted, parse};
+use super::document::{MAX_DEPTH, parse};
 use super::problem::{Place, Sources, nearest};
 use super::read::describe;
+use super::tree::{Key, Kind, Mapping, Node, Scalar, dotted};
 use crate::text::excerpt;
 
 /// The sections whose keys are names that the file chooses.

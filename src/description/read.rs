@@ -1,7 +1,7 @@
 //! From a tree of nodes to typed values, collecting all errors on the way.
 
-use super::document::{Kind, Node, Scalar, Step, dotted};
 use super::problem::{Place, Sources, nearest};
+use super::tree::{Kind, Node, Scalar, Step, dotted};
 use super::value::CLASH_SEPARATOR;
 use crate::text::excerpt;
 use serde::de::DeserializeOwned;

@@ -1,8 +1,8 @@
 //! What types can't say: ranges, references and shapes that make no sense.
 
-use super::document::{Node, Step, dotted};
 use super::mixes;
 use super::problem::{Place, Sources, nearest};
+use super::tree::{Node, Step, dotted};
 use super::{
     Aperture, AreaShape, Assignment, Camera, Color, Description, Film, Filter, Light, LightKind,
     Material, Object, Opening, Projection, Relief, Sampling, Scalar, Transform, ViewTransform,

@@ -10,16 +10,18 @@
 //! is passed to it here is padded for that (see `ray.rs`).
 #![allow(unsafe_code)]
 
+mod accelerator;
 mod device;
+mod geometry;
 mod oidn;
 mod ray;
 #[cfg(feature = "record-rays")]
 mod record;
-mod scene;
 
+pub use accelerator::Accelerator;
 pub use device::{Device, EmbreeError, instructions};
+pub use geometry::{Geometry, SharedMesh, Structure, Vertices};
 pub use oidn::{DenoiseError, Denoiser, Guides};
 pub use ray::{Hit, Ray};
 #[cfg(feature = "record-rays")]
 pub use record::{Query, recorded};
-pub use scene::{Accelerator, Geometry, SharedMesh, Structure, Vertices};

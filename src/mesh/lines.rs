@@ -1,11 +1,13 @@
 //! The lines of an OBJ file, checked on their way to the parser.
 
 use super::feed::{BLOCK, Block};
+use super::raw_lines::RawLines;
+use super::words::{Words, is_no_number, push_decimal};
 use super::{LineProblem, Repair, Wanted};
 use crate::text::{excerpt, excerpt_of_bytes};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use std::io::{self, BufRead, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 /// Faces after which the parser is told that another object begins. It keeps
@@ -17,9 +19,6 @@ const MAX_FACES: usize = 1 << 15;
 
 /// More than this bury the cause.
 const MAX_PROBLEMS: usize = 20;
-
-/// In bytes: room for a face of a million corners.
-const MAX_LINE: usize = 1 << 26;
 
 /// The parser's name for the material of faces that have none: it takes no
 /// empty one, and no line of a file can hold this one.
@@ -74,15 +73,13 @@ const OF_NO_USE: [&[u8]; 26] = [
 /// Gives the lines of a file that describe triangles in blocks, without what is
 /// not wanted; lines that make no sense are reported and left out.
 pub(super) struct Lines<R> {
-    inner: R,
+    file: RawLines<R>,
     wanted: Wanted,
     /// The line being read, as it is in the file.
     raw: Vec<u8>,
     /// The lines to hand on next, and where among them the one being read began.
     block: Block,
     start: usize,
-    /// The number of the line, from 1.
-    number: usize,
     /// How many positions, texture coordinates and normals came so far.
     counts: [u64; 3],
     /// The corners that name what is farthest ahead: line, kind and index.
@@ -139,12 +136,11 @@ pub(super) enum Refusal {
 impl<R: BufRead> Lines<R> {
     pub fn new(inner: R, wanted: Wanted) -> Self {
         Self {
-            inner,
+            file: RawLines::new(inner),
             wanted,
             raw: Vec::new(),
             block: Block::default(),
             start: 0,
-            number: 0,
             counts: [0; 3],
             ahead: Vec::new(),
             farthest: [0; 3],
@@ -237,7 +233,7 @@ impl<R: BufRead> Lines<R> {
     fn problem(&mut self, message: String) {
         if self.problems.len() < MAX_PROBLEMS {
             self.problems.push(LineProblem {
-                line: Some(self.number),
+                line: Some(self.file.number()),
                 message,
             });
         }
@@ -247,7 +243,7 @@ impl<R: BufRead> Lines<R> {
     pub fn next_block(&mut self) -> Option<Block> {
         let mut raw = std::mem::take(&mut self.raw);
         while self.block.text.len() < BLOCK {
-            match self.read_line(&mut raw) {
+            match self.file.next(&mut raw) {
                 Ok(true) => {}
                 Ok(false) => break,
                 Err(error) => {
@@ -259,7 +255,7 @@ impl<R: BufRead> Lines<R> {
                 }
             }
             self.start = self.block.text.len();
-            if self.number == 1 {
+            if self.file.number() == 1 {
                 self.judge_beginning(&raw);
             }
             if raw.contains(&0) && !self.ended {
@@ -272,7 +268,7 @@ impl<R: BufRead> Lines<R> {
             self.line(&raw);
             if self.block.text.len() > self.start {
                 let end = self.block.text.len();
-                self.block.origins.push((end, self.number));
+                self.block.origins.push((end, self.file.number()));
             }
         }
         self.raw = raw;
@@ -288,59 +284,6 @@ impl<R: BufRead> Lines<R> {
         if let Some((_, format)) = found {
             self.problem(format!("expected a Wavefront OBJ file, found {format}"));
             self.ended = true;
-        }
-    }
-
-    /// Reads one line, with those that it continues on. Lines end as on Unix,
-    /// Windows or old Macs.
-    fn read_line(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
-        raw.clear();
-        loop {
-            let before = raw.len();
-            if !self.read_to_line_end(raw)? {
-                return Ok(!raw.is_empty());
-            }
-            self.number += 1;
-            let end = raw.trim_ascii_end().len();
-            let comment = raw.trim_ascii_start().first() == Some(&b'#');
-            if end <= before || raw[end - 1] != b'\\' || comment {
-                return Ok(true);
-            }
-            raw.truncate(end - 1);
-            raw.push(b' ');
-        }
-    }
-
-    /// Appends what is left of a line; false at the end of the file.
-    fn read_to_line_end(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
-        let mut found = false;
-        loop {
-            let available = match self.inner.fill_buf() {
-                Ok(available) => available,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(error),
-            };
-            if available.is_empty() {
-                return Ok(found);
-            }
-            found = true;
-            let end = memchr::memchr2(b'\n', b'\r', available);
-            raw.extend_from_slice(&available[..end.unwrap_or(available.len())]);
-            if raw.len() > MAX_LINE {
-                let message = format!("a line is longer than {MAX_LINE} bytes");
-                return Err(io::Error::new(io::ErrorKind::InvalidData, message));
-            }
-            let Some(end) = end else {
-                let all = available.len();
-                self.inner.consume(all);
-                continue;
-            };
-            let carriage_return = available[end] == b'\r';
-            self.inner.consume(end + 1);
-            if carriage_return && self.inner.fill_buf()?.first() == Some(&b'\n') {
-                self.inner.consume(1);
-            }
-            return Ok(true);
         }
     }
 
@@ -377,7 +320,7 @@ impl<R: BufRead> Lines<R> {
             _ => {
                 self.unknown.0 += 1;
                 if self.unknown.0 == 1 {
-                    self.unknown.1 = self.number;
+                    self.unknown.1 = self.file.number();
                 }
             }
         }
@@ -429,7 +372,7 @@ impl<R: BufRead> Lines<R> {
         if self
             .problems
             .last()
-            .is_some_and(|problem| problem.line == Some(self.number))
+            .is_some_and(|problem| problem.line == Some(self.file.number()))
         {
             // What follows counts on the vertex.
             self.block.text.truncate(self.start);
@@ -544,7 +487,7 @@ impl<R: BufRead> Lines<R> {
                 // A mistake only if the file has any further on.
                 let message = format!("there is no {} {given}: none came before", KINDS[kind]);
                 self.back_from_none[kind].get_or_insert(LineProblem {
-                    line: Some(self.number),
+                    line: Some(self.file.number()),
                     message,
                 });
                 return Ok(0);
@@ -564,7 +507,7 @@ impl<R: BufRead> Lines<R> {
                 return Err(format!("there is no {} {index}", KINDS[kind]));
             }
             self.farthest[kind] = self.farthest[kind].max(index);
-            let corner = (self.number, kind, index);
+            let corner = (self.file.number(), kind, index);
             self.ahead.push(corner);
             if self.ahead.len() > MAX_PROBLEMS {
                 // Those farthest ahead are the ones that may never come.
@@ -598,67 +541,4 @@ impl<R: BufRead> Lines<R> {
         }
         self.hand_on(format_args!("usemtl {handed_on}"));
     }
-}
-
-/// The words of a line up to a comment. MSVC writes numbers that are none with
-/// a `#` inside.
-struct Words<'a>(&'a [u8]);
-
-impl<'a> Iterator for Words<'a> {
-    type Item = &'a [u8];
-
-    fn next(&mut self) -> Option<&'a [u8]> {
-        let text = self.0.trim_ascii_start();
-        let end = text
-            .iter()
-            .position(|byte| byte.is_ascii_whitespace() || *byte == b'#');
-        let mut end = end.unwrap_or(text.len());
-        let mut rest = &text[end..];
-        if rest.first() == Some(&b'#') {
-            let word_end = text.iter().position(u8::is_ascii_whitespace);
-            let word_end = word_end.unwrap_or(text.len());
-            if is_no_number(&text[..word_end]) {
-                end = word_end;
-                rest = &text[end..];
-            } else {
-                rest = b"";
-            }
-        }
-        self.0 = rest;
-        (end > 0).then(|| &text[..end])
-    }
-}
-
-/// Whether this is how a C library writes infinity or a NaN: `-1.#IND`,
-/// `1.#INF00`, `1.#QNAN`, `1.#J` (rounded to two digits), `-nan(ind)`.
-fn is_no_number(word: &[u8]) -> bool {
-    let word = word
-        .strip_prefix(b"-")
-        .or(word.strip_prefix(b"+"))
-        .unwrap_or(word);
-    let starts = |beginnings: &[&[u8]]| {
-        let begins = |beginning: &&[u8]| {
-            word.get(..beginning.len())
-                .is_some_and(|start| start.eq_ignore_ascii_case(beginning))
-        };
-        beginnings.iter().any(begins)
-    };
-    starts(&[
-        b"1.#inf", b"1.#ind", b"1.#qnan", b"1.#snan", b"1.#j", b"1.#r", b"nan(", b"nan:",
-    ])
-}
-
-/// A hot path: three million per million triangles.
-fn push_decimal(out: &mut Vec<u8>, mut number: u64) {
-    let mut digits = [0; 20];
-    let mut start = digits.len();
-    loop {
-        start -= 1;
-        digits[start] = b'0' + (number % 10) as u8;
-        number /= 10;
-        if number == 0 {
-            break;
-        }
-    }
-    out.extend_from_slice(&digits[start..]);
 }

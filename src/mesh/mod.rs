@@ -8,8 +8,10 @@ mod assemble;
 mod feed;
 mod lines;
 mod polygons;
+mod raw_lines;
 mod side;
 mod tangents;
+mod words;
 
 use lines::Refusal;
 use std::collections::BTreeMap;

@@ -7,6 +7,8 @@ mod error;
 mod identity;
 mod load;
 mod material;
+mod material_table;
+mod placing;
 mod resolve;
 mod settings;
 mod stage;

@@ -2,8 +2,7 @@
 
 use super::super::Surface;
 use super::principled::{
-    Layering, NONE, Setup, diffuse_facets, fibres, push_plain, push_transparent, reflecting,
-    transmitting,
+    Layering, NONE, Setup, diffuse_facets, fibres, push_cover, reflecting, transmitting,
 };
 use super::rough::{LEAST_IOR, edge_tinted, film, filmed, to_model_color};
 use super::value::{Number, Point, Tint};
@@ -58,15 +57,9 @@ impl OpenPbr {
         share: f32,
     ) {
         let opacity = self.geometry_opacity.share::<F>(point);
-        if opacity < 1.0 {
-            push_transparent(bsdf, surface, share * (1.0 - opacity));
-        }
-        let mut share = share * opacity;
         let (fuzz, left) = self.fuzz::<F>(point);
-        if let Some(closure) = fuzz {
-            push_plain(bsdf, surface, closure, share, 1.0 - left);
-            share *= left;
-        }
+        push_cover(bsdf, surface, share, opacity, (fuzz, left));
+        let share = share * opacity * left;
         let base = self.base_color.at::<F>(point) * self.base_weight.share::<F>(point);
         let base = base.clamp(Rgb::ZERO, Rgb::ONE);
         let color = self.specular_color.at::<F>(point);

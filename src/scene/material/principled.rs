@@ -125,15 +125,22 @@ pub(super) fn push_transparent<const F: u32>(bsdf: &mut Bsdf<F>, surface: &Surfa
     Stack { bsdf, surface }.push(closure, frame, Rgb::splat(share), Rgb::ONE);
 }
 
-/// A closure of about this albedo without a tangent.
-pub(super) fn push_plain<const F: u32>(
+/// What lies above all layers: light is let straight through beside a share of
+/// `opacity`, and of that one fibres leave the part `left` to what is below.
+pub(super) fn push_cover<const F: u32>(
     bsdf: &mut Bsdf<F>,
     surface: &Surface,
-    closure: Closure,
     share: f32,
-    albedo: f32,
+    opacity: f32,
+    (fibres, left): (Option<Closure>, f32),
 ) {
-    Stack { bsdf, surface }.push_plain(closure, Rgb::splat(share), Rgb::splat(albedo));
+    if opacity < 1.0 {
+        push_transparent(bsdf, surface, share * (1.0 - opacity));
+    }
+    if let Some(closure) = fibres {
+        let weight = Rgb::splat(share * opacity);
+        Stack { bsdf, surface }.push_plain(closure, weight, Rgb::splat(1.0 - left));
+    }
 }
 
 /// The least that a chance is taken for.
@@ -232,17 +239,9 @@ impl Principled4 {
         surface: &Surface,
         share: f32,
     ) {
-        let mut stack = Stack { bsdf, surface };
-        let method = self.setup.reflecting;
         let alpha = self.alpha.share::<F>(point);
-        if alpha < 1.0 {
-            push_transparent(stack.bsdf, surface, share * (1.0 - alpha));
-        }
         let (fibres, left) = self.sheen::<F>(point);
-        if let Some(closure) = fibres {
-            let albedo = Rgb::splat(1.0 - left);
-            stack.push_plain(closure, Rgb::splat(share * alpha), albedo);
-        }
+        push_cover(bsdf, surface, share, alpha, (fibres, left));
         let share = share * left;
         if let Layering::Walks(fixed) = self.setup.layering {
             let frame = self.frame::<F>(point, surface);
@@ -250,6 +249,8 @@ impl Principled4 {
             walked.add(bsdf, surface, frame, plain);
             return;
         }
+        let method = self.setup.reflecting;
+        let mut stack = Stack { bsdf, surface };
         let mut weight = self.coat::<F>(point, share, |closure, weight, albedo| {
             stack.push_plain(closure, weight, albedo);
         });
