@@ -84,8 +84,15 @@ fn sky() -> EnvironmentImage {
 
 /// The radiance of such planes a centimetre apart towards a camera at this cosine, and
 /// its standard error from pixels that all show the same: of as many images of `spp`
-/// samples per pixel as make the error at most this part of the radiance.
-fn radiance(planes: &[String], cos: f32, spp: u32, most_error: f64) -> [f64; 2] {
+/// samples per pixel as make the error at most this part of the radiance. Images by the
+/// same seed are off together, so each has the next of `seeds`.
+fn radiance(
+    planes: &[String],
+    cos: f32,
+    spp: u32,
+    most_error: f64,
+    seeds: &mut impl Iterator<Item = u64>,
+) -> [f64; 2] {
     let sin = (1.0 - cos * cos).sqrt();
     let mut text = format!(
         "smithwalk: 1\n\
@@ -117,7 +124,7 @@ fn radiance(planes: &[String], cos: f32, spp: u32, most_error: f64) -> [f64; 2] 
     };
     let resolved: Resolved = assemble(&description, assets, &Budget::of_machine()).unwrap();
     let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
-    for seed in 1.. {
+    for seed in seeds {
         let settings = Settings {
             seed,
             ..Settings::spp(spp)
@@ -134,18 +141,19 @@ fn radiance(planes: &[String], cos: f32, spp: u32, most_error: f64) -> [f64; 2] 
             return [mean, error];
         }
     }
-    unreachable!("errors of means vanish");
+    unreachable!("there is always another seed");
 }
 
 /// Compares all stacks from three angles, and says how far both are apart.
 fn compare(spp: u32, most_error: f64) {
+    let mut seeds = 1..;
     for stack in &STACKS {
         let layered = [format!("layered: {{{}}}", stack.layered)];
         let planes: Vec<String> = stack.planes.iter().map(|&m| m.to_owned()).collect();
         for cos in [0.95, 0.6, 0.25] {
             let each = most_error / std::f64::consts::SQRT_2;
-            let [one, one_error] = radiance(&layered, cos, spp, each);
-            let [other, other_error] = radiance(&planes, cos, spp, each);
+            let [one, one_error] = radiance(&layered, cos, spp, each, &mut seeds);
+            let [other, other_error] = radiance(&planes, cos, spp, each, &mut seeds);
             let error = one_error.hypot(other_error);
             println!(
                 "cosθ {cos}, {}: layered {one:.5} ± {one_error:.5}, planes {other:.5} ± {other_error:.5}, {:+.2} % ± {:.2} %",
