@@ -8,7 +8,8 @@ and masks by a product of two functions; a glass colour counts once, not at
 every facet; `roughconductor` takes no rotation of its tangent; `principled` is
 Disney's of 2012; a pane is a sheet with two faces, and where there is one the
 integrator is `volpath`, which alone lets light samples through; lamps hide what
-lies behind them, and the sun is a disk 10 km away. Times are those of rendering
+lies behind them, where they are not seen the sky is not either, and the sun is a
+disk 10 km away. Times are those of rendering
 alone; kernels of the llvm variants are compiled before, by a render with another
 seed. Needs PyYAML.
 """
@@ -47,8 +48,9 @@ class Translation(SceneFile):
         """All of it."""
         panes = any("mix" in material for material in self.file["materials"].values())
         # Depth 2 is what Blender counts as no bounce: direct light.
-        scene = {"type": "scene", "sensor": self.sensor(),
-                 "integrator": {"type": "volpath" if panes else "path", "max_depth": self.bounces + 2}}
+        scene = {"type": "scene", "sensor": self.sensor(), "integrator": {
+            "type": "volpath" if panes else "path", "max_depth": self.bounces + 2,
+            "hide_emitters": any("point" in light for light in self.file.get("lights", []))}}
         world = self.world()
         if world:
             scene["world"] = self.background(*world)

@@ -83,16 +83,16 @@ def cost(row):
 def table(scene, versions, rows):
     """Markdown: figures of one scene at the most samples, mean over the seeds."""
     lines = [f"### {scene}", "",
-             "| | version | spp | wall s | CPU s | relative RMSE | relMSE × CPU s | spread "
+             "| | version | spp | CPU s | relative RMSE | relMSE × CPU s | spread "
              "| outliers per million | largest, σ |",
-             "|---" * 10 + "|"]
+             "|---" * 9 + "|"]
     for name, version in versions.items():
-        spp, wall, cpu, error, outliers = (mean_of(rows, name, lambda row, k=key: row[k])[0] for key in (
-            "spp", "wall_s", "cpu_s", "rel_mse", "outliers_per_million"))
+        spp, cpu, error, outliers = (mean_of(rows, name, lambda row, k=key: row[k])[0] for key in (
+            "spp", "cpu_s", "rel_mse", "outliers_per_million"))
         largest = max(mean_of(rows, name, lambda row: row["largest_deviation"])[1])
         mean, costs = mean_of(rows, name, cost)
         spread = statistics.stdev(costs) / abs(mean) if len(costs) > 1 else 0.0
-        lines.append(f"| {name} | {version} | {spp:.0f} | {wall:.2f} | {cpu:.2f} | {max(error, 0.0) ** 0.5:.4f} "
+        lines.append(f"| {name} | {version} | {spp:.0f} | {cpu:.2f} | {max(error, 0.0) ** 0.5:.4f} "
                      f"| {mean:.2e} | ± {100 * spread:.0f} % | {outliers:.0f} | {largest:.0f} |")
     return "\n".join(lines) + "\n\n"
 
@@ -138,8 +138,8 @@ def page(args, raced, missing):
     text = f"""\
 Every renderer against its own converged images, noise alone: relMSE (ε = 0.01, the worst
 0.1 % of the pixels left out) × CPU seconds, {args.seeds} images each at {args.percent} % of the scenes' sizes, {os.cpu_count()} threads
-of a machine that others used as well, one run of `benches/peers/race.py`: CPU times and their
-ratios count, wall times are as they came. Samples are such that images take about as long;
+of a machine that others used as well, one run of `benches/peers/race.py`: the ratios of CPU
+times count. Samples are such that images take about as long;
 {args.reference_spp // args.spp[-1]} × as many make each of the two references. Times are of rendering alone: those of the
 scene's hand-over, which a render of a few pixels tells, are taken off Cycles' and LuxCore's.
 
@@ -149,7 +149,8 @@ as its settings come; *guided* is its path guiding, which learns as it samples a
 four times the samples. Mitsuba and LuxCore render other pictures in part: no rotation of the
 tangent (the engine-turned steel of `brushed_metal` is brushed one way), glass colours once and
 not at every facet, Disney's material for Blender's Principled node, a pane of two faces for one
-(in Mitsuba by `volpath`, which alone lets light through it); in LuxCore lamps are not seen.
+(in Mitsuba by `volpath`, which alone lets light through it); in LuxCore lamps are
+found by light samples alone.
 Outliers are values (three to a pixel) beyond 10 robust standard deviations σ of the image's
 noise, see `smithwalk diff`.
 

@@ -2,7 +2,9 @@
 
     PYTHONPATH=<bpy> python3 blender/scenes/many_lamps.py many_lamps.blend
 
-Two hundred and four point lamps of 3 cm in four colours, on wires between posts.
+Two hundred and four point lamps of 3 cm in four colours, under shades on wires
+between posts; the camera does not see the lamps themselves, as Blender has it for
+new ones.
 """
 
 import math
@@ -17,7 +19,7 @@ import bpy  # noqa: E402
 import common  # noqa: E402
 
 COLORS = ((1.0, 0.72, 0.40), (1.0, 0.72, 0.40), (1.0, 0.35, 0.22), (0.45, 0.75, 1.0), (0.55, 1.0, 0.50))
-STRINGS, LAMPS, WATTS = 6, 34, 3.0  # each
+STRINGS, LAMPS, WATTS = 6, 34, 4.0  # each
 HALF, TOP, SAG = 4.0, 2.9, 0.75
 
 
@@ -32,6 +34,11 @@ def strings(scene):
         lamps.append(lamp)
     shades = list(dict.fromkeys(COLORS))
     wire = common.principled("Wire", (0.02, 0.02, 0.02))
+    ring = [(math.cos(math.pi * k / 8), math.sin(math.pi * k / 8)) for k in range(16)]
+    shade = common.mesh("Shade", [(r * x, r * y, z) for r, z in ((0.02, 0.05), (0.07, 0.0)) for x, y in ring],
+                        [tuple(range(16)), *((k, (k + 1) % 16, 16 + (k + 1) % 16, 16 + k) for k in range(16))],
+                        common.principled("Enamel", (0.03, 0.05, 0.04), 0.3))
+    bpy.data.objects.remove(shade)
     for row in range(STRINGS):
         y = -2.4 + 6.6 * row / (STRINGS - 1)
         points = []
@@ -40,9 +47,12 @@ def strings(scene):
             points.append((HALF * t, y, TOP - SAG * (1.0 - t * t)))
             color = COLORS[(index * 3 + row * 2) % len(COLORS)]
             ob = bpy.data.objects.new("Lamp", lamps[shades.index(color)])
-            ob.location = (points[-1][0], y, points[-1][2] - 0.05)
-            ob.visible_camera = True
+            ob.location = (points[-1][0], y, points[-1][2] - 0.07)
+            ob.visible_camera = False
             scene.collection.objects.link(ob)
+            cover = bpy.data.objects.new("Shade", bpy.data.meshes["Shade"])
+            cover.location = (points[-1][0], y, points[-1][2] - 0.05)
+            scene.collection.objects.link(cover)
         points = [(-HALF, y, TOP), *points, (HALF, y, TOP)]
         ring = ((0.0, 0.008), (-0.007, -0.004), (0.007, -0.004))
         vertices = [(x, y + dy, z + dz) for x, y, z in points for dy, dz in ring]
@@ -67,7 +77,7 @@ def table(number, place, top, cloth):
 def build():
     """320 × 240, 64 spp, 12 bounces."""
     scene = common.empty_scene(320, 240, note=(
-        "A terrace at night: 204 small lamps on strings over stone, wood, rough metals, plastic and\n"
+        "A terrace at night: 204 small lamps under shades on strings over stone, wood, rough metals, plastic and\n"
         "a ball of rough glass."))
     scene.view_settings.view_transform = "Standard"
     common.principled("Iron", (0.35, 0.34, 0.33), 0.45, 1.0)
