@@ -63,14 +63,14 @@ class Command:
         return found["value"][0], found["se"][0]
 
     def cost(self, yaml, spp, folder):
-        """CPU seconds of a render, and the relMSE of its noise, the worst 0.1 % of pixels left out."""
+        """CPU seconds of a render, the least of three, and the relMSE of its noise but for the worst 0.1 % of pixels."""
         images, seconds = [], 0.0
         for seed in (1, 2):
             images.append(os.path.join(folder, f"{seed}.exr"))
-            text = run([self.binary, "render", os.path.join(ROOT, "scenes", "gold_sphere", "scene.yaml"),
-                        "-o", images[-1], "--spp", str(spp), "-D", "sampling.branches=1", "--seed", str(seed),
-                        "-D", f"materials.gold={{{yaml}}}"])
-            seconds += float(re.search(r"\(([\d.]+) s CPU\)", text)[1]) / 2
+            said = [run([self.binary, "render", os.path.join(ROOT, "scenes", "gold_sphere", "scene.yaml"),
+                         "-o", images[-1], "--spp", str(spp), "-D", "sampling.branches=1", "--seed", str(seed),
+                         "-D", f"materials.gold={{{yaml}}}"]) for _ in range(3)]
+            seconds += min(float(re.search(r"\(([\d.]+) s CPU\)", text)[1]) for text in said) / 2
         text = run([self.binary, "diff", *images, "--json"])
         return seconds, json.loads(text)["rel_mse_trimmed"] / 2
 
@@ -149,8 +149,9 @@ def main():
                     f"walks.\n\n{albedos(command, cycles, args.samples)}", PAGE, TITLE)
     section.replace("Lobes", "f·cosθ towards the viewer at 45°, with light from four directions.\n\n"
                     + lobes(command, 2 * args.samples), PAGE, TITLE)
-    section.replace("Cost", f"The sphere of `scenes/gold_sphere` at {args.spp} samples per pixel and one branch; relMSE is that of the "
-                    f"noise, half of what two seeds differ by, the worst 0.1 % of the pixels left out.\n\n{cost(command, args.spp)}", PAGE, TITLE)
+    section.replace("Cost", f"The sphere of `scenes/gold_sphere` at {args.spp} samples per pixel and one branch; CPU times "
+                    "are the least of three, relMSE is that of the noise, half of what two seeds differ by, the worst "
+                    f"0.1 % of the pixels left out.\n\n{cost(command, args.spp)}", PAGE, TITLE)
 
 
 if __name__ == "__main__":

@@ -291,6 +291,58 @@ mod tests {
         }
     }
 
+    /// At one wavelength, the characteristic matrix of the film (Born and Wolf 1999,
+    /// section 1.6), which knows nothing of Airy's sum: fields E and H at the base taken
+    /// through it. A unit of phase is that of exp(iωt), indices are n − ik.
+    #[test]
+    fn airy_s_formula_is_the_characteristic_matrix() {
+        let times = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a * c - b * d, a * d + b * c];
+        for (ior, eta, k) in [
+            (1.33, 1.5, 0.0),
+            (1.33, 0.2, 3.4),
+            (1.8, 2.9, 3.1),
+            (2.0, 1.2, 7.0),
+        ] {
+            for (thickness, cos) in [(80.0, 1.0), (300.0, 0.6), (650.0, 0.2), (900.0, 0.05)] {
+                let film = Film {
+                    ior,
+                    thickness,
+                    cover: 1.0,
+                };
+                let way = Way::into(&film, cos).expect("denser than the outside");
+                let base = Base::new(eta, k, way.sin2);
+                let polarised = way.onto(&base);
+                let [re, im] = base.normal;
+                // Admittances outside, in the film, and below: n cosθ, and n/cosθ.
+                let below_p = {
+                    let [a, b] = [base.square[0], -base.square[1]];
+                    times([a, b], divided([1.0, 0.0], [re, -im]))
+                };
+                let admittances = [
+                    (cos, ior * way.inside, [re, -im]),
+                    (1.0 / cos, ior / way.inside, below_p),
+                ];
+                for (found, (outside, inside, below)) in polarised.iter().zip(admittances) {
+                    for wavelength in [420.0, 550.0, 680.0] {
+                        let delta = way.length / wavelength;
+                        let (sine, cosine) = (0.5 * delta).sin_cos();
+                        let through = times([0.0, sine], below);
+                        let e = [cosine + through[0] / inside, through[1] / inside];
+                        let h = [cosine * below[0], inside * sine + cosine * below[1]];
+                        let over = [outside * e[0] - h[0], outside * e[1] - h[1]];
+                        let under = [outside * e[0] + h[0], outside * e[1] + h[1]];
+                        let [x, y] = divided(over, under);
+                        let (expected, found) = (x * x + y * y, found.reflectance(delta));
+                        assert!(
+                            (found - expected).abs() < 1e-12,
+                            "{film:?}, {eta} + {k}i, {cos}, {wavelength} nm: {found}, not {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
     /// The same of f64 sums in steps of 1 nm, by the sensitivities that the weights are of.
     #[test]
     fn the_spectrum_is_that_of_narrow_steps() {
