@@ -108,8 +108,7 @@ def cycles(args, scene):
                 return [*before(blend), jobs, results, d, str(BOUNCES)]
             able.append(Worker(name, command, 4, {"percent": args.percent}, **environment))
         if version != "3.4":
-            # It learns as it samples: so many more that it can.
-            able.append(Worker(f"{name}, guided", command, 16, {"percent": args.percent, "guided": True}, name,
+            able.append(Worker(f"{name}, guided", command, 4, {"percent": args.percent, "guided": True}, name,
                                **environment))
 
     blender = shutil.which("blender")

@@ -87,12 +87,13 @@ def main():
             folder = os.path.join(args.output, scene, re.sub(r"\W+", "-", contender.name))
             version, found = rows(args, scene, contender, folder)
             for spp, noisy_s, noisy, denoised_s, denoised in found:
-                lines.append(f"| {scene} | {version} | {spp} | {noisy_s:.2f} | {noisy:.3f} | {denoised_s:.2f} | {denoised:.3f} |")
+                lines.append(f"| {scene} | {version} | {spp} | {noisy_s:.2f} | {noisy:.3f} | {denoised_s:.2f} "
+                             f"| {denoised:.3f} |")
                 print(lines[-1], file=sys.stderr, flush=True)
     text = f"""\
-One image each at {args.percent} % of the scenes' sizes, one run of `benches/peers/denoised.py`: FLIP, the mean
-over the pixels, against the renderer's own image of {args.reference_spp} samples (Cycles: {4 * args.reference_spp}), which is denoised
-too; CPU seconds of rendering and denoising on a machine that others used as well. `auto` here, Multiscatter
+One image each at {args.percent} % of the scenes' sizes, one run of `benches/peers/denoised.py`: FLIP,
+the mean over the pixels, against the renderer's own image of {args.reference_spp} samples
+(Cycles: {4 * args.reference_spp}), which is denoised too; CPU seconds of rendering and denoising on a machine that others used as well. `auto` here, Multiscatter
 GGX in Cycles; both denoise by Open Image Denoise with albedo and normal. Mitsuba's denoiser is
 OptiX', which needs a graphics card, and Debian's Blender 3.4 has none.
 

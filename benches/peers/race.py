@@ -16,7 +16,8 @@ largest, against A or B, whichever has fewer, so that no firefly of theirs count
 
 Samples per pixel are this renderer's, which are worth many; the others take a
 multiple (`factor` in contenders.py), so that all images take about as long.
-References that an earlier run left in DIR are kept, as their times do not count.
+What an earlier run left in DIR is kept, references and rows of renderers alike, so
+that a race can be stopped and go on.
 
 Writes for each scene race-SCENE.csv, one row for each image, which `smithwalk
 converge --peer` reads, and race.md, the tables; with --docs the tables become a
@@ -45,6 +46,10 @@ def race(args, scene, contender):
     """Reference and images of one renderer; its version and a row for each image."""
     folder, kept = (os.path.join(args.output, scene, re.sub(r"\W+", "-", name))
                     for name in (contender.name, contender.like))
+    done = os.path.join(folder, "rows.json")
+    if os.path.exists(done):
+        with open(done, encoding="utf-8") as file:
+            return json.load(file)
     for path in (folder, kept):
         os.makedirs(path, exist_ok=True)
     references = [{"spp": args.reference_spp * contender.factor, "seed": 101 + i,
@@ -65,6 +70,8 @@ def race(args, scene, contender):
                      **time, "rel_mse": error, "floor": floor,
                      "outliers_per_million": 1e6 * min(to_a["outliers"], to_b["outliers"]) / values,
                      "largest_deviation": min(to_a["largest_deviation"], to_b["largest_deviation"])})
+    with open(done, "w", encoding="utf-8") as file:
+        json.dump([version, rows], file)
     return version, rows
 
 
@@ -137,22 +144,22 @@ def page(args, raced, missing):
     """The tables and what they mean."""
     text = f"""\
 Every renderer against its own converged images, noise alone: relMSE (ε = 0.01, the worst
-0.1 % of the pixels left out) × CPU seconds, {args.seeds} images each at {args.percent} % of the scenes' sizes, {os.cpu_count()} threads
-of a machine that others used as well, one run of `benches/peers/race.py`: the ratios of CPU
-times count. Samples are such that images take about as long;
-{args.reference_spp // args.spp[-1]} × as many make each of the two references. Times are of rendering alone: those of the
-scene's hand-over, which a render of a few pixels tells, are taken off Cycles' and LuxCore's.
+0.1 % of the pixels left out) × CPU seconds, {args.seeds} images each at {args.percent} % of the scenes'
+sizes, {os.cpu_count()} threads of a machine that others used as well, one run of
+`benches/peers/race.py`: the ratios of CPU times count. Samples are such that images take about
+as long; {args.reference_spp // args.spp[-1]} × as many make each of the two references, whose noise is taken off. Times are
+of rendering alone: those of the scene's hand-over, which a render of a few pixels tells, are
+taken off Cycles' and LuxCore's.
 
 GGX is single scattering; so is all that Mitsuba and LuxCore do. Multiscatter GGX is a random
 walk in Cycles 3.4 and a scaling of single scattering in newer ones. Cycles has its light tree,
-as its settings come; *guided* is its path guiding, which learns as it samples and so has
-four times the samples. Mitsuba and LuxCore render other pictures in part: no rotation of the
-tangent (the engine-turned steel of `brushed_metal` is brushed one way), glass colours once and
-not at every facet, Disney's material for Blender's Principled node, a pane of two faces for one
-(in Mitsuba by `volpath`, which alone lets light through it); in LuxCore lamps are
-found by light samples alone.
-Outliers are values (three to a pixel) beyond 10 robust standard deviations σ of the image's
-noise, see `smithwalk diff`.
+as its settings come; *guided* is its path guiding, which learns as it samples. Mitsuba and
+LuxCore render other pictures in part: no rotation of the tangent (the engine-turned steel of
+`brushed_metal` is brushed one way), glass colours once and not at every facet, Disney's material
+for Blender's Principled node, a pane of two faces for one (in Mitsuba by `volpath`, which alone
+lets light through it); in LuxCore lamps are found by light samples alone. Outliers are values
+(three to a pixel) beyond 10 robust standard deviations σ of the image's noise, see
+`smithwalk diff`.
 
 """
     text += factors(raced)
@@ -168,7 +175,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     add_options(parser)
-    parser.add_argument("--spp", default="4", help="this renderer's samples per pixel, comma-separated")
+    parser.add_argument("--spp", default="16", help="this renderer's samples per pixel, comma-separated")
     parser.add_argument("--reference-spp", type=int, default=64, help="of each of the two")
     parser.add_argument("--seeds", type=int, default=3, help="images to average over")
     args = parser.parse_args()
@@ -180,9 +187,7 @@ def main():
     for scene in args.scenes.split(","):
         able, missing = contenders(args, scene)
         versions, rows = {}, []
-        for contender in able:
-            if not re.search(args.only, contender.name):
-                continue
+        for contender in (one for one in able if re.search(args.only, one.name)):
             print(f"{scene}: {contender.name} …", file=sys.stderr, flush=True)
             versions[contender.name], more = race(args, scene, contender)
             rows += more

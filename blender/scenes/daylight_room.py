@@ -114,19 +114,22 @@ def room():
             (y0 + bar / 2, middle[1], bar, z1 - z0), (y1 - bar / 2, middle[1], bar, z1 - z0), (*middle, bar, z1 - z0),
             (middle[0], z0 + bar / 2, y1 - y0, bar), (middle[0], z1 - bar / 2, y1 - y0, bar), (*middle, y1 - y0, bar))):
         common.box(f"Bar{index + 1}", (x[0] - 0.2, y, z), (0.06, wide, tall)).data.materials.append(frame)
-    common.box("Sill", (x[0] + 0.03, middle[0], z0 - 0.02), (0.3, y1 - y0 + 0.2, 0.04), bevel=0.01).data.materials.append(
-        frame)
+    sill = common.box("Sill", (x[0] + 0.03, middle[0], z0 - 0.02), (0.3, y1 - y0 + 0.2, 0.04), bevel=0.01)
+    sill.data.materials.append(frame)
     glass = pane_material()
-    for name, (a, b), (c, d) in (("Pane1", (y0, middle[0]), (z0, middle[1])), ("Pane2", (middle[0], y1), (z0, middle[1])),
-                                 ("Pane3", (y0, middle[0]), (middle[1], z1)), ("Pane4", (middle[0], y1), (middle[1], z1))):
-        common.quad(name, [(x[0] - 0.2, a, c), (x[0] - 0.2, b, c), (x[0] - 0.2, b, d), (x[0] - 0.2, a, d)], glass)
+    number = 1
+    for c, d in ((z0, middle[1]), (middle[1], z1)):
+        for a, b in ((y0, middle[0]), (middle[0], y1)):
+            common.quad(f"Pane{number}", [(x[0] - 0.2, y, z) for y, z in ((a, c), (b, c), (b, d), (a, d))], glass)
+            number += 1
 
 
 def furniture():
     """A sofa, a table with a vase and a bowl, a picture, a lamp of steel."""
     cloth = common.principled("Cloth", (0.16, 0.26, 0.42), 0.8)
-    for name, place, size in (("Seat", (0.4, 1.9, 0.32), (1.9, 0.85, 0.3)), ("Rest", (0.4, 2.28, 0.62), (1.9, 0.26, 0.66)),
-                              ("Arm1", (-0.62, 1.9, 0.42), (0.22, 0.85, 0.5)), ("Arm2", (1.42, 1.9, 0.42), (0.22, 0.85, 0.5))):
+    for name, place, size in (
+            ("Seat", (0.4, 1.9, 0.32), (1.9, 0.85, 0.3)), ("Rest", (0.4, 2.28, 0.62), (1.9, 0.26, 0.66)),
+            ("Arm1", (-0.62, 1.9, 0.42), (0.22, 0.85, 0.5)), ("Arm2", (1.42, 1.9, 0.42), (0.22, 0.85, 0.5))):
         common.box(name, place, size, bevel=0.06).data.materials.append(cloth)
     cushion = common.box("Cushion", (-0.25, 2.02, 0.64), (0.42, 0.16, 0.4), bevel=0.07)
     cushion.rotation_euler = (math.radians(-18.0), 0.0, math.radians(12.0))

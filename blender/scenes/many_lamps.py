@@ -60,15 +60,16 @@ def strings(scene):
                  for k in range(len(points) - 1) for a, b in ((0, 1), (1, 2), (2, 0))]
         common.mesh(f"Wire{row + 1}", vertices, faces, wire)
         for side in (-HALF, HALF):
-            common.turned(f"Post{row + 1}{'L' if side < 0 else 'R'}", (side, y, 0.0), common.rounded(0.05, TOP + 0.1, 0.01, 2),
-                          bpy.data.materials["Iron"], segments=16)
+            common.turned(f"Post{row + 1}{'L' if side < 0 else 'R'}", (side, y, 0.0),
+                          common.rounded(0.05, TOP + 0.1, 0.01, 2), bpy.data.materials["Iron"], segments=16)
 
 
 def table(number, place, top, cloth):
     """A round table with two stools, and what stands on it."""
     x, y = place
     common.turned(f"Table{number}", (x, y, 0.70), common.rounded(0.55, 0.05, 0.02), top)
-    common.turned(f"Leg{number}", (x, y, 0.0), common.rounded(0.05, 0.69, 0.005, 2), bpy.data.materials["Iron"], segments=16)
+    common.turned(f"Leg{number}", (x, y, 0.0), common.rounded(0.05, 0.69, 0.005, 2), bpy.data.materials["Iron"],
+                  segments=16)
     for index, turn in enumerate((0.6 + number, 0.6 + number + math.pi)):
         common.turned(f"Stool{number}{index + 1}", (x + 0.85 * math.cos(turn), y + 0.85 * math.sin(turn), 0.0),
                       common.rounded(0.22, 0.45, 0.06), cloth, segments=32)
@@ -93,7 +94,8 @@ def build():
             bpy.data.materials.get("Dark") or common.principled("Dark", (0.015, 0.018, 0.025), 0.08))
     wood = common.principled("Wood", (0.38, 0.21, 0.10), 0.45)
     table(1, (-1.7, 0.4), wood, common.principled("Red", (0.55, 0.05, 0.04), 0.5))
-    table(2, (1.6, 1.4), common.principled("White", (0.75, 0.74, 0.70), 0.3), common.diffuse("Canvas", (0.55, 0.50, 0.38)))
+    table(2, (1.6, 1.4), common.principled("White", (0.75, 0.74, 0.70), 0.3),
+          common.diffuse("Canvas", (0.55, 0.50, 0.38)))
     common.sphere("Gold", (-1.9, 0.3, 0.93), radius=0.18, segments=32, rings=16).data.materials.append(
         common.conductor("Gold", (1.0, 0.71, 0.29), 0.6))
     common.sphere("Glass", (-1.45, 0.5, 0.90), radius=0.15, segments=32, rings=16).data.materials.append(

@@ -54,7 +54,8 @@ def build():
     common.turned("Cap", (-1.05, 0.35, 1.62), common.rounded(0.19, 0.42, 0.03), steel)
     common.turned("Jar", (0.2, -0.35, 0.0), common.rounded(0.52, 0.46, 0.08), teal)
     common.turned("Lid", (0.2, -0.35, 0.47), common.rounded(0.54, 0.2, 0.03), gold)
-    common.turned("Stand", (-0.25, 0.55, 0.0), common.rounded(0.23, 0.24, 0.02), common.principled("Black", (0.02, 0.02, 0.022)))
+    common.turned("Stand", (-0.25, 0.55, 0.0), common.rounded(0.23, 0.24, 0.02),
+                  common.principled("Black", (0.02, 0.02, 0.022)))
     common.turned("Tube", (-0.25, 0.55, 0.25), tube(), common.principled("Coral", (0.75, 0.16, 0.10)))
     box = common.box("Box", (1.1, 0.55, 0.6), (0.75, 0.5, 1.2), bevel=0.02)
     box.rotation_euler.z = math.radians(-24.0)
