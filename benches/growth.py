@@ -58,8 +58,8 @@ def main():
 benches/growth.py
 ```
 
-One axis at a time: the scenes of `benches/load.py` at {SIDE} × {SIDE} pixels (a floor, a torus, a floor under lamps,
-a quad for each texture) and `scenes/interior` for the bounces, all at {SPP} samples per pixel, on two cores that others
+One axis at a time: the scenes of `benches/load.py` at {SIDE} × {SIDE} pixels (a floor, a torus, a floor under lamps, a
+quad for each texture) and `scenes/interior` for the bounces, all at {SPP} samples per pixel, on two cores that others
 used as well. CPU seconds of reading and building, and of rendering beyond that; the most memory that was resident.
 """
     for axis in args.only or AXES:
