@@ -69,9 +69,9 @@ def translate(surface, node, groups):
             and node.inputs["Thin Film Thickness"].default_value == 0.0:
         surface.idle(node, *_IDLE["Thin Film Thickness"])
     if keys.get("thin_film_thickness") and (keys.get("metallic") or keys.get("transmission_weight")):
-        surface.warn("its thin film on metal or glass is summed over 32 wavelengths, and on metal lies over the complex "
-                     "index that reflects as the node does bare, where Cycles takes another: colours differ by some "
-                     "percent", node)
+        surface.warn("its thin film on metal or glass is summed over 32 wavelengths, and on metal lies over the "
+                     "complex index that reflects as the node does bare, where Cycles takes another: colours differ "
+                     "by some percent", node)
     if keys.get("anisotropic"):
         surface.tell_scaling(node)
         rotation = surface.turns(node, "Anisotropic Rotation", groups)
