@@ -123,7 +123,7 @@ fn what_is_left_out_has_the_documented_default() {
             spp: 64,
             seed: 0,
             max_bounces: 12,
-            roulette_start: 8,
+            roulette_start: None,
             branches: None,
             estimator: auto
         }

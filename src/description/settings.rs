@@ -95,8 +95,10 @@ pub struct Sampling {
     pub seed: u64,
     /// Surface interactions after the first hit.
     pub max_bounces: u32,
-    /// The first bounce at which Russian roulette may end a path.
-    pub roulette_start: u32,
+    /// The first bounce at which Russian roulette may end a path, by its throughput; `None`
+    /// has all bounces play by what a path may yet add to its pixel, where that is worth
+    /// its time, or else from bounce 8.
+    pub roulette_start: Option<u32>,
     /// Into how many branches a path splits at its first surface, on average
     /// over the image: more where it is noisy. 1 is plain path tracing; `None`
     /// leaves it to what a branch costs.
@@ -117,7 +119,7 @@ impl Default for Sampling {
             spp: 64,
             seed: 0,
             max_bounces: 12,
-            roulette_start: 8,
+            roulette_start: None,
             branches: None,
             estimator: Estimator::Auto,
         }

@@ -5,8 +5,9 @@ use crate::film::FilmTile;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::pass::{Integrator, Job, pilots, samples};
-use super::path::{PathResult, PathTracer};
+use super::pass::{Integrator, Job, pilots, samples, training};
+use super::path::{PathResult, PathTracer, TrainingPath};
+use super::roulette::{Grid, Survival};
 use super::split::{Cells, Pilot, Split};
 use crate::embree::Ray;
 
@@ -55,7 +56,13 @@ const NODES: Features = ROOM
     .with(Features::MIXES)
     .with(Features::DIFFUSERS)
     .with(Features::PRINCIPLED);
-/// The same by walks, and other stacks that nothing gets through.
+/// The same with glass, what mixes make of it, and lamps that the camera does not see.
+const HOME: Features = NODES
+    .with(Features::TRANSMISSION)
+    .with(Features::TRANSPARENCY)
+    .with(Features::VIEW_DEPENDENT)
+    .with(Features::RAY_VISIBILITY);
+/// Opaque surfaces of that node by walks, and other stacks that nothing gets through.
 const STACKS: Features = NODES.with(Features::LAYERS);
 const EVERYTHING: Features = Features::EVERYTHING;
 
@@ -63,8 +70,18 @@ impl<const F: u32> Integrator for PathTracer<'_, F> {
     const FEATURES: Features = Features::from_bits(F);
 
     #[inline]
-    fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult {
-        Self::trace(self, ray, sampler, split)
+    fn trace(
+        &self,
+        ray: Ray,
+        sampler: &mut Sampler,
+        split: Split,
+        survival: Survival,
+    ) -> PathResult {
+        Self::trace(self, ray, sampler, split, survival)
+    }
+
+    fn train(&self, ray: Ray, sampler: &mut Sampler, survival: Survival) -> TrainingPath {
+        Self::train(self, ray, sampler, survival)
     }
 }
 
@@ -75,6 +92,8 @@ pub(super) struct Kernel {
     pub samples: fn(&Job<'_>, &mut [FilmTile]) -> u64,
     /// Traces the pilot paths of these cells.
     pub pilots: fn(&Job<'_>, &Cells) -> Vec<Pilot>,
+    /// Traces the training paths of this grid.
+    pub training: fn(&Job<'_>, &Grid) -> Vec<TrainingPath>,
 }
 
 impl Kernel {
@@ -94,13 +113,20 @@ impl Kernel {
                     cells,
                 )
             },
+            training: |job, grid| {
+                training(
+                    &PathTracer::<F>::new(job.scene, job.settings, false),
+                    job,
+                    grid,
+                )
+            },
         }
     }
 }
 
 /// Every kernel there is, from the leanest to the one with everything.
 pub const KERNELS: &[Features] = &[
-    PLAIN, LIT, METAL, FURNACE, ROOM, GLASS, TEXTURED, STUDIO, NODES, STACKS, EVERYTHING,
+    PLAIN, LIT, METAL, FURNACE, ROOM, GLASS, TEXTURED, STUDIO, NODES, HOME, STACKS, EVERYTHING,
 ];
 
 /// The same list as code; the test below holds the two together.
@@ -114,6 +140,7 @@ const CODE: &[Kernel] = &[
     Kernel::new::<{ TEXTURED.bits() }>(),
     Kernel::new::<{ STUDIO.bits() }>(),
     Kernel::new::<{ NODES.bits() }>(),
+    Kernel::new::<{ HOME.bits() }>(),
     Kernel::new::<{ STACKS.bits() }>(),
     Kernel::new::<{ EVERYTHING.bits() }>(),
 ];

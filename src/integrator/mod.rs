@@ -4,9 +4,11 @@ mod kernel;
 mod pass;
 mod path;
 mod render;
+mod roulette;
 mod split;
 
 pub use kernel::{KERNELS, kernel_for};
 pub use path::{FirstHit, PathResult, PathTracer};
 pub use render::{Checkpoint, Control, Progress, RenderError, RenderReport, Stop, render};
+pub use roulette::Survival;
 pub use split::{Split, Spread};

@@ -3,7 +3,8 @@
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
-use super::path::PathResult;
+use super::path::{PathResult, TrainingPath};
+use super::roulette::{Grid, Roulette, Survival};
 use super::split::{CELL, Cells, Draws, Pilot, Plan, Split};
 use crate::camera::Camera;
 use crate::embree::Ray;
@@ -18,7 +19,16 @@ pub(super) trait Integrator: Sync {
     const FEATURES: Features;
 
     /// The light along a ray, which may split at the first surface.
-    fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult;
+    fn trace(
+        &self,
+        ray: Ray,
+        sampler: &mut Sampler,
+        split: Split,
+        survival: Survival,
+    ) -> PathResult;
+
+    /// The same by a plain path, told step by step.
+    fn train(&self, ray: Ray, sampler: &mut Sampler, survival: Survival) -> TrainingPath;
 }
 
 /// What a pass is over, and how far it goes.
@@ -27,6 +37,7 @@ pub(super) struct Job<'a> {
     pub settings: &'a RenderSettings,
     pub camera: &'a Camera,
     pub plan: &'a Plan,
+    pub roulette: &'a Roulette,
     /// Each tile gets the samples with an index below this that it has not had.
     pub end: u32,
     /// Looked at by all threads between a tile's samples: whether to leave off here.
@@ -84,6 +95,7 @@ fn sample<I: Integrator>(
     tile: &mut FilmTile,
 ) -> u64 {
     let draws = job.plan.at(pixel);
+    let survival = job.roulette.at(pixel);
     let mut paths = ArrayVec::<Sample, { Draws::MOST as usize }>::new();
     let mut rays = 0;
     for path in index * draws.camera_rays..(index + 1) * draws.camera_rays {
@@ -91,7 +103,7 @@ fn sample<I: Integrator>(
         let film = sampler.get_2d(Dimension::camera_pixel());
         let lens = sampler.get_2d(Dimension::lens());
         let (ray, depth_scale) = job.camera_ray::<I>(pixel, film, lens);
-        let result = integrator.trace(ray, &mut sampler, draws.split(path));
+        let result = integrator.trace(ray, &mut sampler, draws.split(path), survival);
         rays += u64::from(result.rays);
         paths.push(result.to_sample(job.settings.gain, depth_scale));
     }
@@ -122,14 +134,39 @@ fn pilot<I: Integrator>(integrator: &I, job: &Job<'_>, cell: [u32; 2]) -> Pilot 
     });
     let film = sampler.get_2d(Dimension::camera_pixel());
     let lens = sampler.get_2d(Dimension::lens());
+    let survival = job.roulette.at(pixel);
     let mut pilot = Pilot::default();
     for path in 0..2 {
         let opposite = |u: [f32; 2]| u.map(|u| (u + 0.5 * path as f32).fract());
         let (ray, _) = job.camera_ray::<I>(pixel, opposite(film), opposite(lens));
-        let result = integrator.trace(ray, &mut sampler, Draws::PILOT.split(0));
+        let result = integrator.trace(ray, &mut sampler, Draws::PILOT.split(0), survival);
         pilot.paths[path] = [result.light_samples, result.branches];
         pilot.radiance[path] = result.radiance.total().to_array();
         pilot.rays += result.rays;
     }
     pilot
+}
+
+/// Traces a plain path through each cell of a grid, row by row.
+pub(super) fn training<I: Integrator>(
+    integrator: &I,
+    job: &Job<'_>,
+    grid: &Grid,
+) -> Vec<TrainingPath> {
+    let cells: Vec<_> = grid.cells().collect();
+    cells
+        .into_par_iter()
+        .with_min_len(16)
+        .map(|cell| {
+            if (job.leave_off)(0) {
+                return TrainingPath::default();
+            }
+            let mut sampler = Sampler::training(job.settings.seed, cell);
+            let pixel = grid.pixel(cell, sampler.get_2d(Dimension::pilot_pixel()));
+            let film = sampler.get_2d(Dimension::camera_pixel());
+            let lens = sampler.get_2d(Dimension::lens());
+            let (ray, _) = job.camera_ray::<I>(pixel, film, lens);
+            integrator.train(ray, &mut sampler, job.roulette.at(pixel))
+        })
+        .collect()
 }

@@ -11,9 +11,11 @@ mod media;
 mod result;
 mod state;
 mod tracer;
+mod training;
 
 pub use result::{FirstHit, PathResult};
 pub use tracer::PathTracer;
+pub(super) use training::TrainingPath;
 
 use std::ops::Range;
 
@@ -22,6 +24,7 @@ use crate::camera::Cone;
 use crate::color::Rgb;
 use crate::embree::Ray;
 use crate::features::{Features, has};
+use crate::integrator::roulette::Survival;
 use crate::integrator::split::{Split, Spread};
 use crate::rays::RayKind;
 use crate::sampler::{Dimension, Purpose, Sampler};
@@ -33,17 +36,19 @@ use result::Found;
 use state::{Path, Vertex};
 use tracer::MAX_STRAIGHT;
 
-/// The least probability that Russian roulette lets a path go on with: bounds
-/// the factor on what survives.
-const MIN_SURVIVAL: f32 = 0.05;
-
 impl<const F: u32> PathTracer<'_, F> {
     /// The light that arrives along `ray` at the camera: what the ray meets on the way
     /// to the first surface that scatters, the mean of that surface's light samples,
     /// and the mean of the branches behind it.
-    pub fn trace(&self, ray: Ray, sampler: &mut Sampler, split: Split) -> PathResult {
+    pub fn trace(
+        &self,
+        ray: Ray,
+        sampler: &mut Sampler,
+        split: Split,
+        survival: Survival,
+    ) -> PathResult {
         let mut found = Found::default();
-        let mut trunk = Path::from_camera(ray, self.cone(&ray));
+        let mut trunk = Path::from_camera(ray, self.cone(&ray), survival);
         let Some(surface) = self.next_surface(&mut trunk, &mut found) else {
             return PathResult::of(found);
         };
@@ -242,20 +247,17 @@ impl<const F: u32> PathTracer<'_, F> {
         path.ray = surface.spawn(sample.wi);
         path.cone.width = surface.footprint;
         path.multiple |= sample.order > 1;
-        path.kind = match has::<F>(Features::RAY_VISIBILITY) {
-            true => sample.kind,
-            // Then all that are not the camera's see the same.
-            false => RayKind::Diffuse,
-        };
+        path.kind = sample.kind;
         path.last = Vertex {
             receiver: self.scene.receiver(surface),
             pdf,
             travelled: 0.0,
         };
-        if path.bounce < self.settings.roulette_start {
+        let throughput = path.throughput.max_element();
+        let survival = path.survival.chance(path.bounce, path.kind, throughput);
+        if survival >= 1.0 {
             return true;
         }
-        let survival = path.throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
         if sampler.get_1d(Dimension::roulette(path.vertex)) >= survival {
             return false;
         }

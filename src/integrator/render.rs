@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::kernel::{self, Kernel};
 use super::pass::Job;
+use super::roulette::{self, Grid, Roulette, Survival};
 use super::split::{Plan, pass_length};
 use crate::features::Features;
 use crate::film::Film;
@@ -57,6 +58,9 @@ pub struct RenderReport {
 
 /// The least samples per pixel before an error estimate is believed.
 const MIN_SPP_FOR_NOISE: u32 = 16;
+
+/// The bounce from which paths play by throughput where nothing better is known.
+const PLAIN_ROULETTE: u32 = 8;
 
 /// How often progress is told within a pass.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(500);
@@ -115,22 +119,39 @@ pub fn render(
         "the film is of another layout"
     );
     let camera = scene.camera.as_ref().ok_or(RenderError::NoCamera)?;
-    let (features, Kernel { samples, pilots }) = kernel::for_scene(scene, settings.all_in);
+    let (features, kernel) = kernel::for_scene(scene, settings.all_in);
+    let Kernel {
+        samples,
+        pilots,
+        training,
+    } = kernel;
     let limits = settings.limits;
     let first = settings.share.start;
     let target = limits.spp.min(settings.share.end).saturating_sub(first);
     let watch = Watch::new(&control, film, target);
 
     let unplanned = Plan::default();
+    let even = Survival::from(settings.roulette_start.unwrap_or(PLAIN_ROULETTE));
+    let untrained = Roulette::Even(even);
     let mut job = Job {
         scene,
         settings,
         camera,
         plan: &unplanned,
+        roulette: &untrained,
         end: first,
         leave_off: &|_| watch.interrupted(),
     };
     let pilot_rays = AtomicU64::new(0);
+    let plain = settings.branches == Some(1) || settings.roulette_start.is_some();
+    let trained = (!plain).then(|| {
+        let grid = Grid::new(settings.resolution);
+        let paths = training(&job, &grid);
+        let rays = paths.iter().map(|path| u64::from(path.rays)).sum();
+        pilot_rays.fetch_add(rays, Ordering::Relaxed);
+        roulette::fit(&paths, grid, even)
+    });
+    job.roulette = trained.as_ref().unwrap_or(&untrained);
     let plan = Plan::new(settings, |cells| {
         let found = pilots(&job, cells);
         let rays = found.iter().map(|pilot| u64::from(pilot.rays)).sum();

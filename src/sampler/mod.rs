@@ -184,6 +184,12 @@ impl Sampler {
         Self::new(mix(seed), cell, 0)
     }
 
+    /// The numbers of the training path through a cell of a grid over the full image
+    /// (column, row from the top left): others than those of any sample or pilot.
+    pub fn training(seed: u64, cell: [u32; 2]) -> Self {
+        Self::new(mix(mix(seed)), cell, 0)
+    }
+
     /// Goes on with another sample of the pixel, for all dimensions that are
     /// drawn from now on: paths that share their first vertices are samples
     /// of their own behind those.

@@ -73,7 +73,7 @@ pub(super) fn identity(
     add("transparent".into(), transparent.to_string());
     add("seed".into(), seed.to_string());
     add("max_bounces".into(), max_bounces.to_string());
-    add("roulette_start".into(), roulette_start.to_string());
+    add("roulette_start".into(), format!("{roulette_start:?}"));
     add("branches".into(), format!("{branches:?}"));
     add("estimator".into(), format!("{estimator:?}"));
     add("light_units".into(), format!("{light_units:?}"));

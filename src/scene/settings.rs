@@ -53,8 +53,9 @@ pub struct RenderSettings {
     pub limits: Limits,
     /// Surface interactions after the first.
     pub max_bounces: u32,
-    /// Russian roulette starts at this bounce.
-    pub roulette_start: u32,
+    /// The bounce from which on Russian roulette goes by throughput; `None` leaves it to
+    /// what a path may yet bring, or has plain paths play from the eighth.
+    pub roulette_start: Option<u32>,
     /// Into how many branches a path splits at its first surface, on average over the
     /// pixels where they differ; 1 is plain path tracing, and `None` leaves it to what
     /// a branch costs.

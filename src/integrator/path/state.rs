@@ -6,6 +6,7 @@ use crate::bsdf::ByOrder;
 use crate::camera::Cone;
 use crate::color::Rgb;
 use crate::embree::Ray;
+use crate::integrator::roulette::Survival;
 use crate::light::Receiver;
 use crate::rays::RayKind;
 use crate::scene::{Surface, View};
@@ -29,6 +30,8 @@ pub(super) struct Path {
     pub media: Media,
     /// What its ray is seen as: by the last scattering.
     pub kind: RayKind,
+    /// How likely it is to go on.
+    pub survival: Survival,
     /// How wide a pixel is along the ray, where something needs it; reflection and
     /// refraction leave it its spread.
     pub cone: Cone,
@@ -48,7 +51,7 @@ pub(super) struct Vertex {
 }
 
 impl Path {
-    pub fn from_camera(ray: Ray, cone: Cone) -> Self {
+    pub fn from_camera(ray: Ray, cone: Cone, survival: Survival) -> Self {
         Self {
             ray,
             throughput: Rgb::ONE,
@@ -63,6 +66,7 @@ impl Path {
             to_surface: 0.0,
             media: Media::default(),
             kind: RayKind::Camera,
+            survival,
             cone,
         }
     }
