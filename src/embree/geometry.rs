@@ -124,7 +124,7 @@ impl Structure {
     /// Builds the structure of a mesh that instances place.
     ///
     /// # Errors
-    /// As [`Accelerator::build`].
+    /// As [`super::Accelerator::build`].
     pub fn of_mesh(device: &Arc<Device>, mesh: &SharedMesh) -> Result<Self, EmbreeError> {
         Self::build(device, [(0, mesh.clone(), RayKinds::ALL)])
     }
@@ -133,7 +133,7 @@ impl Structure {
     /// their numbers.
     ///
     /// # Errors
-    /// As [`Accelerator::build`].
+    /// As [`super::Accelerator::build`].
     pub fn of_meshes(device: &Arc<Device>, geometries: &[Geometry]) -> Result<Self, EmbreeError> {
         let meshes = (0u32..).zip(geometries);
         Self::build(
