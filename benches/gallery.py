@@ -100,8 +100,8 @@ def page(args, rows):
         "## What multiple scattering costs", "",
         "Time per sample at the same number of samples, over a whole image: camera rays, light samples",
         "and the ground are in it. The talk's figures (24, 27, 19 and 87 %) come from other scenes, another",
-        "renderer and another machine. They stand here in its order, the last beside all diffuse facets;",
-        "for glass of constant roughness there is none.", "",
+        "renderer and another machine. They stand here in its order. The slide of the 87 % has no title: that",
+        "it shows diffuse facets, beside which it stands, is a guess. For glass of constant roughness there is none.", "",
         "| material | single, ns | multiple, ns | extra time, median | range | the talk |",
         "|---|---|---|---|---|---|",
     ]

@@ -46,7 +46,13 @@ impl Survival {
         if bounce < self.from {
             return 1.0;
         }
-        (self.factors[index(kind)] * throughput).clamp(LEAST, 1.0)
+        let chance = self.factors[index(kind)] * throughput;
+        // Infinity times 0 is not a number.
+        if chance.is_nan() {
+            LEAST
+        } else {
+            chance.clamp(LEAST, 1.0)
+        }
     }
 }
 
@@ -166,5 +172,50 @@ impl Grid {
             (place / u64::from(self.resolution[axis])) as usize
         });
         y * self.side[0] as usize + x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chances are probabilities, whatever the factors: light may be at the end of what
+    /// single precision holds.
+    #[test]
+    fn chances_are_probabilities() {
+        for factor in [0.0, 1e-38, 1.0, f32::MAX, f32::INFINITY] {
+            let survival = Survival {
+                from: 0,
+                factors: [factor; 3],
+            };
+            for throughput in [0.0, 1e-38, 1.0, f32::MAX, f32::INFINITY] {
+                let chance = survival.chance(3, RayKind::Glossy, throughput);
+                assert!(
+                    (LEAST..=1.0).contains(&chance),
+                    "{factor} {throughput}: {chance}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn every_pixel_is_in_the_cell_that_goes_through_it() {
+        for resolution in [[1, 1], [3, 200], [256, 255], [5000, 17]] {
+            let grid = Grid::new(resolution);
+            for (index, cell) in grid.cells().enumerate() {
+                for within in [[0.0; 2], [0.5; 2], [0.999; 2]] {
+                    let pixel = grid.pixel(cell, within);
+                    assert!(pixel[0] < resolution[0] && pixel[1] < resolution[1]);
+                    let found = grid.cell(pixel);
+                    let side = grid.side[0] as usize;
+                    // A pixel across two cells belongs to one of them.
+                    assert!(
+                        (found % side).abs_diff(index % side) <= 1
+                            && (found / side).abs_diff(index / side) <= 1,
+                        "{resolution:?} {cell:?} {pixel:?}"
+                    );
+                }
+            }
+        }
     }
 }
