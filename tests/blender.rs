@@ -50,8 +50,9 @@ fn script(file: Option<&Path>, script: &str, arguments: &[&str]) -> String {
         Some(file) => command.arg(file),
         None => command.arg("--factory-startup"),
     };
+    // Without this a script that ends by an exception passes for a success.
     command
-        .arg("--python")
+        .args(["--python-exit-code", "1", "--python"])
         .arg(repository("blender").join(script));
     if !arguments.is_empty() {
         command.arg("--").args(arguments);
