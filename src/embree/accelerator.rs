@@ -229,22 +229,20 @@ mod tests {
         (Arc::new(vertices.into()), Arc::new(vec![[0, 1, 2]]))
     }
 
+    fn still((vertices, triangles): SharedMesh) -> Geometry {
+        Geometry::Mesh {
+            vertices,
+            triangles,
+            seen_by: RayKinds::ALL,
+        }
+    }
+
     fn device() -> Arc<Device> {
         Arc::new(Device::new(1).expect("Embree is installed"))
     }
 
     fn mesh() -> Accelerator {
-        let (vertices, triangles) = unit_triangle();
-        Accelerator::build(
-            device(),
-            Vec::new(),
-            &[Geometry::Mesh {
-                vertices,
-                triangles,
-                seen_by: RayKinds::ALL,
-            }],
-        )
-        .expect("a valid mesh")
+        Accelerator::build(device(), Vec::new(), &[still(unit_triangle())]).expect("a valid mesh")
     }
 
     fn shared(device: &Arc<Device>) -> Arc<Structure> {
@@ -418,16 +416,8 @@ mod tests {
     fn an_index_out_of_range_is_an_error_and_never_reaches_the_library() {
         let (vertices, _) = unit_triangle();
         let triangles = Arc::new(vec![[0, 1, 2], [0, 1, 3]]);
-        let error = Accelerator::build(
-            device(),
-            Vec::new(),
-            &[Geometry::Mesh {
-                vertices,
-                triangles,
-                seen_by: RayKinds::ALL,
-            }],
-        )
-        .expect_err("vertex 3 of 3");
+        let error = Accelerator::build(device(), Vec::new(), &[still((vertices, triangles))])
+            .expect_err("vertex 3 of 3");
         assert!(
             error.to_string().contains("triangle 1 names vertex 3"),
             "{error}"

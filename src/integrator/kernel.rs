@@ -2,14 +2,12 @@
 
 use crate::features::Features;
 use crate::film::FilmTile;
-use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::pass::{Integrator, Job, pilots, samples, training};
-use super::path::{PathResult, PathTracer, TrainingPath};
-use super::roulette::{Grid, Survival};
-use super::split::{Cells, Pilot, Split};
-use crate::embree::Ray;
+use super::pass::{Job, pilots, samples, training};
+use super::path::{PathTracer, TrainingPath};
+use super::roulette::Grid;
+use super::split::{Cells, Pilot};
 
 /// Lambertian surfaces under a constant world, or shining themselves: nothing
 /// to sample.
@@ -65,25 +63,6 @@ const HOME: Features = NODES
 /// Opaque surfaces of that node by walks, and other stacks that nothing gets through.
 const STACKS: Features = NODES.with(Features::LAYERS);
 const EVERYTHING: Features = Features::EVERYTHING;
-
-impl<const F: u32> Integrator for PathTracer<'_, F> {
-    const FEATURES: Features = Features::from_bits(F);
-
-    #[inline]
-    fn trace(
-        &self,
-        ray: Ray,
-        sampler: &mut Sampler,
-        split: Split,
-        survival: Survival,
-    ) -> PathResult {
-        Self::trace(self, ray, sampler, split, survival)
-    }
-
-    fn train(&self, ray: Ray, sampler: &mut Sampler, survival: Survival) -> TrainingPath {
-        Self::train(self, ray, sampler, survival)
-    }
-}
 
 /// What a kernel does.
 #[derive(Clone, Copy)]

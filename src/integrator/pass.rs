@@ -3,33 +3,15 @@
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
-use super::path::{PathResult, TrainingPath};
-use super::roulette::{Grid, Roulette, Survival};
-use super::split::{CELL, Cells, Draws, Pilot, Plan, Split};
+use super::path::{PathTracer, TrainingPath};
+use super::roulette::{Grid, Roulette};
+use super::split::{CELL, Cells, Draws, Pilot, Plan};
 use crate::camera::Camera;
 use crate::embree::Ray;
-use crate::features::Features;
+use crate::features::{Features, has};
 use crate::film::{FilmTile, Sample};
 use crate::sampler::{Dimension, Sampler};
 use crate::scene::{RenderSettings, Scene};
-
-/// Something that finds the light that arrives along camera rays.
-pub(super) trait Integrator: Sync {
-    /// What it has code for.
-    const FEATURES: Features;
-
-    /// The light along a ray, which may split at the first surface.
-    fn trace(
-        &self,
-        ray: Ray,
-        sampler: &mut Sampler,
-        split: Split,
-        survival: Survival,
-    ) -> PathResult;
-
-    /// The same by a plain path, told step by step.
-    fn train(&self, ray: Ray, sampler: &mut Sampler, survival: Survival) -> TrainingPath;
-}
 
 /// What a pass is over, and how far it goes.
 pub(super) struct Job<'a> {
@@ -47,7 +29,7 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// The camera ray through `pixel` for these numbers on filter and lens, and what
     /// turns the distance along it into the depth along the view axis.
-    fn camera_ray<I: Integrator>(
+    fn camera_ray<const F: u32>(
         &self,
         pixel: [u32; 2],
         film: [f32; 2],
@@ -55,7 +37,7 @@ impl Job<'_> {
     ) -> (Ray, f32) {
         let [dx, dy] = self.settings.filter.offset(film);
         let raster = [pixel[0] as f32 + 0.5 + dx, pixel[1] as f32 + 0.5 + dy];
-        let lens = if I::FEATURES.contains(Features::DEPTH_OF_FIELD) {
+        let lens = if has::<F>(Features::DEPTH_OF_FIELD) {
             lens
         } else {
             [0.5; 2]
@@ -67,7 +49,11 @@ impl Job<'_> {
 
 /// Adds the job's samples to every tile; returns the rays traced. All pixels of a tile
 /// have equally many samples at any time, tiles only when the job was not left off.
-pub(super) fn samples<I: Integrator>(integrator: &I, job: &Job<'_>, tiles: &mut [FilmTile]) -> u64 {
+pub(super) fn samples<const F: u32>(
+    tracer: &PathTracer<'_, F>,
+    job: &Job<'_>,
+    tiles: &mut [FilmTile],
+) -> u64 {
     tiles
         .par_iter_mut()
         // A few tiles can cost most of a pass: none waits behind another.
@@ -77,7 +63,7 @@ pub(super) fn samples<I: Integrator>(integrator: &I, job: &Job<'_>, tiles: &mut 
             while tile.next() < job.end && !(job.leave_off)(tile.window().area() as u64) {
                 let index = tile.next();
                 for pixel in tile.window().pixels() {
-                    rays += sample(integrator, job, pixel, index, tile);
+                    rays += sample(tracer, job, pixel, index, tile);
                 }
                 tile.advance();
             }
@@ -87,8 +73,8 @@ pub(super) fn samples<I: Integrator>(integrator: &I, job: &Job<'_>, tiles: &mut 
 }
 
 /// Adds sample number `index` of a pixel; returns the rays traced.
-fn sample<I: Integrator>(
-    integrator: &I,
+fn sample<const F: u32>(
+    tracer: &PathTracer<'_, F>,
     job: &Job<'_>,
     pixel: [u32; 2],
     index: u32,
@@ -102,8 +88,8 @@ fn sample<I: Integrator>(
         let mut sampler = Sampler::new(job.settings.seed, pixel, path);
         let film = sampler.get_2d(Dimension::camera_pixel());
         let lens = sampler.get_2d(Dimension::lens());
-        let (ray, depth_scale) = job.camera_ray::<I>(pixel, film, lens);
-        let result = integrator.trace(ray, &mut sampler, draws.split(path), survival);
+        let (ray, depth_scale) = job.camera_ray::<F>(pixel, film, lens);
+        let result = tracer.trace(ray, &mut sampler, draws.split(path), survival);
         rays += u64::from(result.rays);
         paths.push(result.to_sample(job.settings.gain, depth_scale));
     }
@@ -113,19 +99,23 @@ fn sample<I: Integrator>(
 
 /// Traces the pilot paths of these cells, row by row. Those that come after the job
 /// was left off are empty.
-pub(super) fn pilots<I: Integrator>(integrator: &I, job: &Job<'_>, cells: &Cells) -> Vec<Pilot> {
+pub(super) fn pilots<const F: u32>(
+    tracer: &PathTracer<'_, F>,
+    job: &Job<'_>,
+    cells: &Cells,
+) -> Vec<Pilot> {
     (0..cells.count())
         .into_par_iter()
         .with_min_len(16)
         .map(|index| match (job.leave_off)(0) {
             true => Pilot::default(),
-            false => pilot(integrator, job, cells.cell(index)),
+            false => pilot(tracer, job, cells.cell(index)),
         })
         .collect()
 }
 
 /// Traces two paths through a pixel of a cell, see [`Pilot`].
-fn pilot<I: Integrator>(integrator: &I, job: &Job<'_>, cell: [u32; 2]) -> Pilot {
+fn pilot<const F: u32>(tracer: &PathTracer<'_, F>, job: &Job<'_>, cell: [u32; 2]) -> Pilot {
     let mut sampler = Sampler::pilot(job.settings.seed, cell);
     let within = sampler.get_2d(Dimension::pilot_pixel());
     let pixel = [0, 1].map(|axis| {
@@ -138,8 +128,8 @@ fn pilot<I: Integrator>(integrator: &I, job: &Job<'_>, cell: [u32; 2]) -> Pilot 
     let mut pilot = Pilot::default();
     for path in 0..2 {
         let opposite = |u: [f32; 2]| u.map(|u| (u + 0.5 * path as f32).fract());
-        let (ray, _) = job.camera_ray::<I>(pixel, opposite(film), opposite(lens));
-        let result = integrator.trace(ray, &mut sampler, Draws::PILOT.split(0), survival);
+        let (ray, _) = job.camera_ray::<F>(pixel, opposite(film), opposite(lens));
+        let result = tracer.trace(ray, &mut sampler, Draws::PILOT.split(0), survival);
         pilot.paths[path] = [result.light_samples, result.branches];
         pilot.radiance[path] = result.radiance.total().to_array();
         pilot.rays += result.rays;
@@ -148,8 +138,8 @@ fn pilot<I: Integrator>(integrator: &I, job: &Job<'_>, cell: [u32; 2]) -> Pilot 
 }
 
 /// Traces a plain path through each cell of a grid, row by row.
-pub(super) fn training<I: Integrator>(
-    integrator: &I,
+pub(super) fn training<const F: u32>(
+    tracer: &PathTracer<'_, F>,
     job: &Job<'_>,
     grid: &Grid,
 ) -> Vec<TrainingPath> {
@@ -165,8 +155,8 @@ pub(super) fn training<I: Integrator>(
             let pixel = grid.pixel(cell, sampler.get_2d(Dimension::pilot_pixel()));
             let film = sampler.get_2d(Dimension::camera_pixel());
             let lens = sampler.get_2d(Dimension::lens());
-            let (ray, _) = job.camera_ray::<I>(pixel, film, lens);
-            integrator.train(ray, &mut sampler, job.roulette.at(pixel))
+            let (ray, _) = job.camera_ray::<F>(pixel, film, lens);
+            tracer.train(ray, &mut sampler, job.roulette.at(pixel))
         })
         .collect()
 }
