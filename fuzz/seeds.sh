@@ -33,7 +33,9 @@ END
 "$smithwalk" render "$scratch/scene.yaml" --spp 2 -o "$scratch/a.film" -o "$scratch/a.exr" -o "$scratch/a.png" > /dev/null
 # The target adds the magic bytes and the sum itself.
 head -c -16 "$scratch/a.film" | tail -c +17 > "$corpus/film/aovs"
-"$smithwalk" render "$scratch/scene.yaml" --spp 3 -D film.aovs=[] --part 1/2 -o "$scratch/b.film" > /dev/null
+printf 'LUT_3D_SIZE 2\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n' > "$scratch/view.cube"
+"$smithwalk" render "$scratch/scene.yaml" --spp 3 -D film.aovs=[] --part 1/2 -o "$scratch/b.film" \
+    -D 'film.view={lut: view.cube, log2: {offset: 1, min: 0, max: 4}}' > /dev/null
 head -c -16 "$scratch/b.film" | tail -c +17 > "$corpus/film/part"
 cp "$scratch/a.exr" "$corpus/image/aovs.exr"
 cp "$scratch/a.exr" "$corpus/texture/aovs.exr"

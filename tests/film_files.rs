@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use smithwalk::film::{Aov, AovSet, Film, FilmError, Identity, Sample, SavedFilm, sidecar_path};
+use smithwalk::film::{
+    Aov, AovSet, Film, FilmError, Finish, Identity, Origin, Sample, SavedFilm, sidecar_path,
+};
 use smithwalk::image::{Display, OutputError, OutputPath, Window, read_exr};
 use smithwalk::sampler::{Dimension, Sampler};
 
@@ -77,6 +79,18 @@ fn identity(seed: &str) -> Identity {
         .into()
 }
 
+fn origin(seed: &str) -> Origin {
+    Origin {
+        identity: identity(seed),
+        target: 8,
+        finish: Some(Finish {
+            scene: "Grünspan.yaml".to_owned(),
+            complete: "1f".to_owned(),
+            display: Display::srgb(0.1),
+        }),
+    }
+}
+
 #[test]
 fn an_exr_comes_back_bit_by_bit() {
     let folder = Folder::new("exr");
@@ -141,9 +155,10 @@ fn a_resumed_film_equals_an_uninterrupted_one() {
         tile.add(pixel, &[Sample::of([u[0]; 3])]);
     }
     tile.advance();
-    first.save(&path, &identity("1"), 8).unwrap();
+    first.save(&path, &origin("1")).unwrap();
     let mut resumed = film();
     let saved = SavedFilm::read(&path).unwrap();
+    assert_eq!(saved.origin, origin("1"));
     resumed.resume(saved, &identity("1")).unwrap();
     assert!(resumed == first, "saving changed the film");
     assert_eq!(resumed.samples_per_pixel(), 3);
@@ -187,7 +202,7 @@ fn a_film_of_another_render_is_refused_and_the_difference_named() {
     let path = folder.file("image.exr.film");
     let mut saved = film();
     expose(&mut saved, 2);
-    saved.save(&path, &identity("1"), 4).unwrap();
+    saved.save(&path, &origin("1")).unwrap();
 
     let differs = |film: &mut Film, identity: &Identity| {
         let before = film.clone();
@@ -251,7 +266,7 @@ fn sums_that_no_colours_have_are_refused() {
         tile.add([0, 0], &[Sample::of([1.0, 2.0, 3.0])]);
         tile.advance();
     }
-    film.save(&path, &Identity::new(), 1).unwrap();
+    film.save(&path, &origin("1")).unwrap();
     let good = std::fs::read(&path).unwrap();
     // First the bins, of 38 exponents each: 1 is in bin 0.
     let content = good.len() - 16;

@@ -14,7 +14,7 @@ fn command(args: &[&str]) -> Command {
     command
 }
 
-fn succeeds(args: &[&str]) -> Output {
+pub fn succeeds(args: &[&str]) -> Output {
     let output = command(args).output().expect("the program starts");
     let log = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{args:?}: {log}");
@@ -282,7 +282,7 @@ fn a_terminated_render_is_saved_and_goes_on() {
     assert!(!Path::new(&room.file("a.exr.film")).exists());
 }
 
-fn json(args: &[&str]) -> serde_json::Value {
+pub fn json(args: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&succeeds(args).stdout).expect("JSON on stdout")
 }
 

@@ -280,6 +280,13 @@ fn frames_have_parts() {
         stands.image("merged.exr").color,
         stands.image("whole.exr").color
     );
+    // The frame that was merged is as complete as one that was rendered.
+    let merged = ["--frames", "2", "-o", "merged.exr", "--resume"];
+    let said = stands.render(&merged);
+    assert_eq!(
+        String::from_utf8_lossy(&said.stdout),
+        "frame 2 is complete\n"
+    );
     // A film of a frame is not one of another frame.
     let log = stands.refused(&[
         "--frames",

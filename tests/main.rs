@@ -25,6 +25,7 @@ mod inputs;
 mod layers;
 mod leadr;
 mod light;
+mod merge;
 mod parity;
 mod relief;
 mod render;

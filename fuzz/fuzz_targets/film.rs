@@ -9,7 +9,7 @@ use smithwalk::film::SavedFilm;
 use xxhash_rust::xxh3::xxh3_128;
 
 fuzz_target!(|content: &[u8]| {
-    let mut bytes = b"smithwalk film\0\x06".to_vec();
+    let mut bytes = b"smithwalk film\0\x07".to_vec();
     bytes.extend_from_slice(content);
     bytes.extend_from_slice(&xxh3_128(&bytes).to_le_bytes());
     if let Ok(saved) = SavedFilm::read(&file::written("film", &bytes)) {

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use serde_json::json;
 use smithwalk::film::SavedFilm;
+use smithwalk::image::{Display, Log2};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -17,7 +18,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
-    let SavedFilm { header, film, .. } = SavedFilm::read(&args.film)?;
+    let SavedFilm { origin, film, .. } = SavedFilm::read(&args.film)?;
+    let display = origin.finish.as_ref().map(|finish| &finish.display);
     let (window, [width, height]) = (film.window(), film.resolution());
     let samples = film.common();
     let most = film.tiles().iter().map(|tile| tile.taken().count()).max();
@@ -29,12 +31,21 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
         let report = json!({
             "width": width, "height": height,
             "window": [window.x, window.y, window.x + window.width, window.y + window.height],
-            "spp": samples.count(), "target": header.target,
+            "spp": samples.count(), "target": origin.target,
             "samples": ranges.collect::<Vec<_>>(),
-            "share": [share.start, share.end.min(header.target)],
+            "share": [share.start, share.end.min(origin.target)],
             "aovs": aovs, "noise": noise,
+            "scene": origin.finish.as_ref().map(|finish| &finish.scene),
+            "display": display.map(|display| json!({
+                "exposure": display.exposure,
+                "view": display.lut.as_ref().map(|lut| {
+                    let Log2 { offset, min, max } = lut.domain();
+                    let log2 = json!({ "offset": offset, "min": min, "max": max });
+                    json!({ "nodes": lut.side(), "log2": log2 })
+                }),
+            })),
             "faults": film.faults().iter().map(|f| f.samples).sum::<u64>(),
-            "identity": header.identity,
+            "identity": origin.identity,
         });
         writeln!(out, "{report:#}")?;
         return Ok(ExitCode::SUCCESS);
@@ -47,7 +58,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
         window.y,
         window.y + window.height - 1
     )?;
-    let (count, target) = (samples.count(), header.target);
+    let (count, target) = (samples.count(), origin.target);
     writeln!(out, "{count} of {target} samples per pixel: {samples}")?;
     if let Some(most) = most.filter(|&most| most > count) {
         writeln!(out, "up to {most} where the render was interrupted")?;
@@ -58,8 +69,17 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
     if !aovs.is_empty() {
         writeln!(out, "with {}", aovs.join(", "))?;
     }
+    match display {
+        Some(Display { exposure, lut }) => {
+            let view = lut.as_ref().map_or("sRGB".to_owned(), |lut| {
+                format!("a table of {}³ colours", lut.side())
+            });
+            writeln!(out, "PNGs: exposure {exposure}, {view}")?;
+        }
+        None => writeln!(out, "PNGs: sRGB, since the film is of an older format")?,
+    }
     super::render::tell_faults(out, &film)?;
-    for (name, value) in &header.identity {
+    for (name, value) in &origin.identity {
         writeln!(out, "  {name}: {value}")?;
     }
     Ok(ExitCode::SUCCESS)

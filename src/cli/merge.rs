@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{bail, ensure};
-use smithwalk::film::{Film, FilmError, SavedFilm, difference};
+use smithwalk::film::{Film, FilmError, Finish, Origin, SavedFilm};
 use smithwalk::image::{Display, OutputPath, check_output};
+
+use super::render::{COMPLETE, attributes, tell_faults};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,9 +23,9 @@ pub struct Args {
         value_name = "OUT.exr|OUT.png|OUT.film"
     )]
     output: Vec<PathBuf>,
-    /// Exposure of PNG files, in stops; they are plain sRGB
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    exposure: f32,
+    /// Exposure of PNG files, in stops [default: the scene's]
+    #[arg(long, allow_negative_numbers = true)]
+    exposure: Option<f32>,
 }
 
 pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Result<ExitCode> {
@@ -40,11 +42,16 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     let [first, ..] = &parts[..] else {
         bail!("no parts");
     };
-    let header = first.header.clone();
+    // PNGs come from films, too.
+    let are_shown = !films.is_empty() || images.iter().any(OutputPath::is_png);
+    let origin = Origin {
+        finish: finish(args, &parts, are_shown, log)?,
+        ..first.origin.clone()
+    };
     let film = merge(parts)?;
 
     let samples = film.common();
-    let (count, target) = (samples.count(), header.target);
+    let (count, target) = (samples.count(), origin.target);
     if count < target {
         writeln!(
             log,
@@ -52,17 +59,22 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
         )?;
     }
     for path in films {
-        film.save(path, &header.identity, target)?;
+        film.save(path, &origin)?;
     }
     let mut image = film.develop();
-    let known = |name: &str| header.identity.get(name).cloned().unwrap_or_default();
-    image.attributes = vec![
-        ("smithwalk.version".to_owned(), known("program")),
-        ("smithwalk.spp".to_owned(), count.to_string()),
-        ("smithwalk.seed".to_owned(), known("seed")),
-    ];
+    image.attributes = attributes(&origin, count);
+    let finish = origin.finish.as_ref();
+    let mut display = finish.map_or_else(Display::default, |finish| finish.display.clone());
+    match (finish, args.exposure) {
+        (Some(finish), None) if count == target => {
+            let mark = (COMPLETE.to_owned(), finish.complete.clone());
+            image.attributes.push(mark);
+        }
+        (_, Some(exposure)) => display.exposure = exposure,
+        _ => {}
+    }
     for output in &images {
-        output.write(&image, &Display::srgb(args.exposure))?;
+        output.write(&image, &display)?;
     }
     for path in &args.output {
         writeln!(out, "{}", path.display())?;
@@ -71,7 +83,7 @@ pub fn run(args: &Args, out: &mut dyn Write, log: &mut dyn Write) -> anyhow::Res
     if let Some(noise) = film.relative_error() {
         writeln!(out, "estimated relative error {noise:.4}")?;
     }
-    super::render::tell_faults(out, &film)?;
+    tell_faults(out, &film)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -81,9 +93,7 @@ fn read(paths: &[PathBuf]) -> anyhow::Result<Vec<SavedFilm>> {
     for path in paths {
         let part = SavedFilm::read(path)?;
         if let Some(first) = parts.first() {
-            let difference = difference(&part.header.identity, &first.header.identity)
-                .or_else(|| part.header.layout_difference(&first.header));
-            if let Some(difference) = difference {
+            if let Some(difference) = part.difference(first) {
                 let path = path.clone();
                 let error = FilmError::OtherRender { path, difference };
                 let first = first.path.display();
@@ -93,6 +103,49 @@ fn read(paths: &[PathBuf]) -> anyhow::Result<Vec<SavedFilm>> {
         parts.push(part);
     }
     Ok(parts)
+}
+
+/// What images have beside samples: what the first part that says it says. `tells` warns of
+/// parts that say otherwise.
+fn finish(
+    args: &Args,
+    parts: &[SavedFilm],
+    tells: bool,
+    log: &mut dyn Write,
+) -> anyhow::Result<Option<Finish>> {
+    let first = parts.iter().find(|part| part.origin.finish.is_some());
+    let finish = first.and_then(|part| part.origin.finish.clone());
+    let look = first.map_or("plain sRGB".to_owned(), |part| {
+        format!("as {} says", part.path.display())
+    });
+    for part in parts.iter().filter(|_| tells) {
+        let difference = match (&part.origin.finish, &finish) {
+            (Some(theirs), Some(ours)) => display_difference(args, &theirs.display, &ours.display)
+                .map(|difference| format!("has {difference}")),
+            _ => Some("is of an older format, without exposure and view transform".to_owned()),
+        };
+        if let Some(difference) = difference {
+            let path = part.path.display();
+            writeln!(log, "warning: {path} {difference}; PNGs are {look}")?;
+        }
+    }
+    Ok(finish)
+}
+
+/// How PNGs look otherwise, for people; `None` where they don't.
+fn display_difference(args: &Args, theirs: &Display, ours: &Display) -> Option<String> {
+    let (exposure, expected) = (theirs.exposure, ours.exposure);
+    let is_asked = args.exposure.is_some();
+    let exposure =
+        (!is_asked && exposure != expected).then(|| format!("exposure {exposure}, not {expected}"));
+    let view = match (&theirs.lut, &ours.lut) {
+        (theirs, ours) if theirs == ours => None,
+        (None, _) => Some("no view transform".to_owned()),
+        (Some(_), None) => Some("a view transform".to_owned()),
+        (Some(_), Some(_)) => Some("another view transform".to_owned()),
+    };
+    let all: Vec<String> = exposure.into_iter().chain(view).collect();
+    (!all.is_empty()).then(|| all.join(" and "))
 }
 
 fn merge(parts: Vec<SavedFilm>) -> anyhow::Result<Film> {

@@ -15,7 +15,7 @@ use anyhow::{Context, ensure};
 use smithwalk::description::{Description, Estimator};
 use smithwalk::embree::Denoiser;
 use smithwalk::features::Features;
-use smithwalk::film::{Aov, Film, Identity, SavedFilm};
+use smithwalk::film::{Aov, Film, Finish, Identity, Origin, SavedFilm};
 use smithwalk::image::{DENOISED, Display, Image, Layer, OutputPath, Window};
 use smithwalk::integrator::{Checkpoint, Control, RenderReport, Stop, render};
 use smithwalk::scene::{Limits, RenderSettings, Resolved, Scene};
@@ -292,8 +292,8 @@ impl Shot<'_> {
         }
 
         let reporter = Reporter::new(args.progress, &settings.limits, frame);
-        let target = settings.limits.spp;
-        let mut save = |film: &Film| match film.save(&outputs.film, identity, target) {
+        let origin = self.origin(identity, &settings);
+        let mut save = |film: &Film| match film.save(&outputs.film, &origin) {
             Ok(()) => reporter.saved(),
             Err(error) => reporter.warn(&format!("{error}; it is tried again later")),
         };
@@ -316,11 +316,12 @@ impl Shot<'_> {
             .map(|(before, after)| after - before);
 
         let interrupted = report.stop == Stop::Interrupted;
-        let mut failed = outputs
-            .keep_film(&film, identity, target, interrupted)
-            .err();
+        let mut failed = outputs.keep_film(&film, &origin, interrupted).err();
         let mut image = film.develop();
-        image.attributes = attributes(args, description, &report);
+        image.attributes = attributes(&origin, report.spp);
+        let seconds = format!("{:.3}", report.wall.as_secs_f64());
+        let seconds = ("smithwalk.seconds".to_owned(), seconds);
+        image.attributes.push(seconds);
         if !interrupted {
             let mark = complete_mark(identity, description, &settings);
             image.attributes.push((COMPLETE.to_owned(), mark));
@@ -349,10 +350,29 @@ impl Shot<'_> {
             None => {}
         }
         if let Some(error) = failed {
-            let rescued = outputs.rescue(&film, identity, target);
+            let rescued = outputs.rescue(&film, &origin);
             return Err(error.context(rescued));
         }
         Ok(Done { film, report, cpu })
+    }
+
+    /// What the film says that it is of.
+    fn origin(&self, identity: &Identity, settings: &RenderSettings) -> Origin {
+        let target = settings.limits.spp;
+        let whole = RenderSettings {
+            share: 0..u32::MAX,
+            limits: Limits::samples(target),
+            ..settings.clone()
+        };
+        Origin {
+            identity: identity.clone(),
+            target,
+            finish: Some(Finish {
+                scene: self.args.scene.scene.display().to_string(),
+                complete: complete_mark(identity, self.description, &whole),
+                display: self.display.clone(),
+            }),
+        }
     }
 
     /// Prints it. All files come first: standard output may be closed.
@@ -365,7 +385,7 @@ impl Shot<'_> {
 }
 
 /// The attribute of complete images.
-const COMPLETE: &str = "smithwalk.complete";
+pub const COMPLETE: &str = "smithwalk.complete";
 
 /// A hash of all that decides about a complete image.
 fn complete_mark(
@@ -457,33 +477,20 @@ fn window(args: &Args, [width, height]: [u32; 2]) -> anyhow::Result<Window> {
     })
 }
 
-fn attributes(
-    args: &Args,
-    description: &Description,
-    report: &RenderReport,
-) -> Vec<(String, String)> {
+/// What EXR files say of a render, whole or merged of parts, with so many samples.
+pub fn attributes(origin: &Origin, spp: u32) -> Vec<(String, String)> {
+    let known = |name: &str| origin.identity.get(name).cloned();
+    let scene = origin.finish.as_ref().map(|finish| finish.scene.clone());
     let pairs = [
-        ("smithwalk.version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("smithwalk.scene", args.scene.scene.display().to_string()),
-        ("smithwalk.spp", report.spp.to_string()),
-        ("smithwalk.seed", description.sampling.seed.to_string()),
-        (
-            "smithwalk.estimator",
-            format!("{:?}", description.sampling.estimator),
-        ),
-        (
-            "smithwalk.max_bounces",
-            description.sampling.max_bounces.to_string(),
-        ),
-        (
-            "smithwalk.seconds",
-            format!("{:.3}", report.wall.as_secs_f64()),
-        ),
+        ("version", known("program")),
+        ("scene", scene),
+        ("spp", Some(spp.to_string())),
+        ("seed", known("seed")),
+        ("estimator", known("estimator")),
+        ("max_bounces", known("max_bounces")),
     ];
-    pairs
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
+    let named = pairs.map(|(name, value)| Some((format!("smithwalk.{name}"), value?)));
+    named.into_iter().flatten().collect()
 }
 
 fn summarise(

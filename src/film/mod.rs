@@ -19,7 +19,7 @@ mod tile;
 
 pub use aov::{Aov, AovSet};
 pub use filter::PixelFilter;
-pub use save::{FilmError, Header, Identity, SavedFilm, difference, sidecar_path};
+pub use save::{FilmError, Finish, Identity, Origin, SavedFilm, sidecar_path};
 pub use taken::Taken;
 pub use tile::{Fault, FaultCount, FilmTile, Sample};
 

@@ -1,11 +1,17 @@
 //! Saving a film between runs and for other machines, bit by bit.
 //!
-//! Layout, integers little-endian: 16 magic bytes; the length of the header (u32) and
-//! the header, JSON of [`Header`]; then per tile the ranges of its samples (a u32 count
-//! and 2 × u32 each), its sums, its halves (6 × f32 per pixel), the samples left out
-//! (u32 per pixel, and again for AOVs if there are any), and its faults (per cause a u64
-//! count, a u32 number of pixels and 2 × u32 each); last the XXH3 of all that (u128).
+//! Layout, numbers little-endian: 16 magic bytes, the last of them the version; the length
+//! of the header (u32) and the header, JSON of [`Header`]; how PNGs look: the exposure
+//! (f32), the nodes per side of the view transform's table (u32, 0 without one), and of a
+//! table its offset, min and max (f32) and its nodes (3 × f32 each); then per tile the
+//! ranges of its samples (a u32 count and 2 × u32 each), its sums, its halves (6 × f32 per
+//! pixel), the samples left out (u32 per pixel, and again for AOVs if there are any), and
+//! its faults (per cause a u64 count, a u32 number of pixels and 2 × u32 each); last the
+//! XXH3 of all that (u128).
+//!
+//! Version 6 has neither [`Finish`] nor how PNGs look.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read as _, Write as _};
@@ -17,9 +23,14 @@ use xxhash_rust::xxh3::Xxh3Default;
 use super::exact::ExactSums;
 use super::tile::{FAULT_PIXELS, FilmTile};
 use super::{Aov, AovSet, Film, Taken};
-use crate::image::{OutputError, Window, replace_with};
+use crate::image::{Display, Log2, Lut, OutputError, Window, replace_with};
 
-const MAGIC: &[u8; 16] = b"smithwalk film\0\x06";
+/// The first bytes, but for the version after them.
+const MAGIC: &[u8; 15] = b"smithwalk film\0";
+/// The version that is written.
+const VERSION: u8 = 7;
+/// The last version before films said how their images look.
+const WITHOUT_FINISH: u8 = 6;
 
 /// About as many bytes are written to a file at once.
 const AT_ONCE: usize = 1 << 20;
@@ -60,13 +71,37 @@ pub enum FilmError {
     },
 }
 
-/// What a saved film is of.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Header {
-    /// See [`Identity`].
+/// What a film is of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Origin {
+    /// What decides about its samples.
     pub identity: Identity,
     /// Samples per pixel that the whole render is to have.
     pub target: u32,
+    /// What its images have beside samples; films of version 6 don't say.
+    pub finish: Option<Finish>,
+}
+
+/// What images of a render have beside its samples, which do not depend on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finish {
+    /// The scene's file, as the render was told it.
+    pub scene: String,
+    /// A hash of all that decides about the image of all samples.
+    pub complete: String,
+    /// How PNGs look.
+    pub display: Display,
+}
+
+/// What a file says of its film before the tiles.
+#[derive(Serialize, Deserialize)]
+struct Header<'a> {
+    identity: Cow<'a, Identity>,
+    target: u32,
+    #[serde(default)]
+    scene: Cow<'a, str>,
+    #[serde(default)]
+    complete: Cow<'a, str>,
     resolution: [u32; 2],
     /// Left, top, width, height.
     window: [u32; 4],
@@ -75,31 +110,13 @@ pub struct Header {
     share: [u32; 2],
 }
 
-impl Header {
-    /// How the images of two films differ, for people; `None` when they don't.
-    pub fn layout_difference(&self, other: &Self) -> Option<String> {
-        if (self.resolution, self.window) != (other.resolution, other.window) {
-            Some("it has another resolution or crop".to_owned())
-        } else if self.aovs != other.aovs {
-            Some("it has other AOVs".to_owned())
-        } else if self.target != other.target {
-            let [theirs, ours] = [self.target, other.target];
-            Some(format!(
-                "it is a part of {theirs} samples per pixel, not of {ours}"
-            ))
-        } else {
-            None
-        }
-    }
-}
-
 /// A film from a file.
 #[derive(Clone, Debug)]
 pub struct SavedFilm {
     /// The file.
     pub path: PathBuf,
     /// What it is of.
-    pub header: Header,
+    pub origin: Origin,
     /// The sums.
     pub film: Film,
 }
@@ -112,7 +129,7 @@ pub fn sidecar_path(image: &Path) -> PathBuf {
 }
 
 /// How two identities differ, for people: at most a few names; `None` when they don't.
-pub fn difference(theirs: &Identity, ours: &Identity) -> Option<String> {
+fn difference(theirs: &Identity, ours: &Identity) -> Option<String> {
     const NAMED: usize = 4;
     let names = theirs
         .keys()
@@ -144,21 +161,24 @@ pub fn difference(theirs: &Identity, ours: &Identity) -> Option<String> {
 }
 
 impl Film {
-    /// Saves the accumulators, all bits of them, as a film of a render of this identity
-    /// that is to have `target` samples per pixel.
+    /// Saves the accumulators, all bits of them, with what they are of; without
+    /// [`Origin::finish`] as version 6.
     ///
     /// # Errors
     /// When the file can't be written; one that was there before stays.
-    pub fn save(&self, path: &Path, identity: &Identity, target: u32) -> Result<(), OutputError> {
+    pub fn save(&self, path: &Path, origin: &Origin) -> Result<(), OutputError> {
         let Window {
             x,
             y,
             width,
             height,
         } = self.window;
+        let finish = origin.finish.as_ref();
         let header = Header {
-            identity: identity.clone(),
-            target,
+            identity: Cow::Borrowed(&origin.identity),
+            target: origin.target,
+            scene: finish.map_or("", |finish| &finish.scene).into(),
+            complete: finish.map_or("", |finish| &finish.complete).into(),
             resolution: self.resolution,
             window: [x, y, width, height],
             aovs: self.aovs.iter().collect(),
@@ -166,8 +186,12 @@ impl Film {
         };
         let header = serde_json::to_vec(&header).expect("strings and numbers alone");
         let mut bytes = MAGIC.to_vec();
+        bytes.push(finish.map_or(WITHOUT_FINISH, |_| VERSION));
         bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
         bytes.extend_from_slice(&header);
+        if let Some(finish) = finish {
+            write_display(&finish.display, &mut bytes);
+        }
         replace_with(path, |file| {
             let mut hash = Xxh3Default::new();
             let mut write = |bytes: &[u8]| {
@@ -192,16 +216,11 @@ impl Film {
     /// # Errors
     /// When it is not, or has gaps between its samples. This film is then unchanged.
     pub fn resume(&mut self, saved: SavedFilm, identity: &Identity) -> Result<(), FilmError> {
-        let SavedFilm { path, header, film } = saved;
+        let SavedFilm { path, origin, film } = saved;
         let other = |difference| Err(FilmError::OtherRender { path, difference });
-        if let Some(difference) = difference(&header.identity, identity) {
+        let difference = difference(&origin.identity, identity);
+        if let Some(difference) = difference.or_else(|| film.layout_difference(self)) {
             return other(difference);
-        }
-        if film.resolution != self.resolution || film.window != self.window {
-            return other("it has another resolution or crop".to_owned());
-        }
-        if film.aovs != self.aovs {
-            return other("it has other AOVs".to_owned());
         }
         let begins = |tile: &FilmTile| match tile.taken.ranges() {
             [] => true,
@@ -219,9 +238,33 @@ impl Film {
         self.share = share;
         Ok(())
     }
+
+    /// How the image differs from another film's, for people; `None` when it doesn't.
+    fn layout_difference(&self, other: &Self) -> Option<String> {
+        if (self.resolution, self.window) != (other.resolution, other.window) {
+            Some("it has another resolution or crop".to_owned())
+        } else if self.aovs != other.aovs {
+            Some("it has other AOVs".to_owned())
+        } else {
+            None
+        }
+    }
 }
 
 impl SavedFilm {
+    /// What keeps it from being a part of the same render as another, for people; `None`
+    /// when it is one.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let target = || {
+            let [theirs, ours] = [self.origin.target, other.origin.target];
+            (theirs != ours)
+                .then(|| format!("it is a part of {theirs} samples per pixel, not of {ours}"))
+        };
+        difference(&self.origin.identity, &other.origin.identity)
+            .or_else(|| self.film.layout_difference(&other.film))
+            .or_else(target)
+    }
+
     /// Reads a film.
     ///
     /// # Errors
@@ -241,18 +284,16 @@ impl SavedFilm {
         }
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
-        let mut magic = [0; MAGIC.len()];
+        let mut magic = [0; MAGIC.len() + 1];
         if length < magic.len() as u64 {
             return Err(format("it begins differently"));
         }
         file.read_exact(&mut magic).map_err(io)?;
-        if magic != *MAGIC {
-            let same = magic.starts_with(&MAGIC[..15]);
-            return Err(format(match same {
-                true => "it is of another version",
-                false => "it begins differently",
-            }));
-        }
+        let version = match magic.strip_prefix(MAGIC) {
+            Some(&[version @ (WITHOUT_FINISH | VERSION)]) => version,
+            Some(_) => return Err(format("it is of another version")),
+            None => return Err(format("it begins differently")),
+        };
         let damaged = || format("it is cut off or damaged");
         let overhead = (magic.len() + size_of::<u128>()) as u64;
         let mut reader = Reader {
@@ -261,16 +302,29 @@ impl SavedFilm {
             hash: Xxh3Default::new(),
         };
         reader.hash.update(&magic);
-        let read = read(&mut reader);
+        let read = read(&mut reader, version);
         if !reader.finish().map_err(io)? {
             return Err(damaged());
         }
-        let (header, film) = read.ok_or_else(|| format("its content contradicts itself"))?;
+        let (origin, film) = read.ok_or_else(|| format("its content contradicts itself"))?;
         Ok(Self {
             path: path.to_owned(),
-            header,
+            origin,
             film,
         })
+    }
+}
+
+fn write_display(display: &Display, bytes: &mut Vec<u8>) {
+    bytes.extend_from_slice(&display.exposure.to_le_bytes());
+    let side = display.lut.as_ref().map_or(0, Lut::side);
+    bytes.extend_from_slice(&(side as u32).to_le_bytes());
+    if let Some(lut) = &display.lut {
+        let Log2 { offset, min, max } = lut.domain();
+        let nodes = lut.nodes().as_flattened();
+        for value in [offset, min, max].iter().chain(nodes) {
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
     }
 }
 
@@ -297,12 +351,17 @@ fn write_tile(tile: &FilmTile, bytes: &mut Vec<u8>) {
 }
 
 /// All between the magic bytes and the hash; `None` when it can't be a film's.
-fn read(reader: &mut Reader) -> Option<(Header, Film)> {
+fn read(reader: &mut Reader, version: u8) -> Option<(Origin, Film)> {
     let length = reader.u32()? as usize;
     if length > LONGEST_HEADER {
         return None;
     }
-    let header: Header = serde_json::from_slice(&reader.bytes(length)?).ok()?;
+    let header = reader.bytes(length)?;
+    let header: Header = serde_json::from_slice(&header).ok()?;
+    let display = match version {
+        WITHOUT_FINISH => None,
+        _ => Some(reader.display()?),
+    };
     let [x, y, width, height] = header.window;
     let window = Window {
         x,
@@ -324,7 +383,17 @@ fn read(reader: &mut Reader) -> Option<(Header, Film)> {
     for tile in &mut film.tiles {
         reader.tile(tile)?;
     }
-    (reader.left == 0).then_some((header, film))
+    let finish = display.map(|display| Finish {
+        scene: header.scene.into_owned(),
+        complete: header.complete.into_owned(),
+        display,
+    });
+    let origin = Origin {
+        identity: header.identity.into_owned(),
+        target: header.target,
+        finish,
+    };
+    (reader.left == 0).then_some((origin, film))
 }
 
 /// A saved film as it is read: whole in memory it would be as much again as the film.
@@ -387,6 +456,30 @@ impl Reader {
         Some(words.map(word).collect())
     }
 
+    fn floats(&mut self, count: usize) -> Option<Vec<f32>> {
+        let words = self.words(count)?;
+        Some(words.into_iter().map(f32::from_bits).collect())
+    }
+
+    fn display(&mut self) -> Option<Display> {
+        let exposure = f32::from_bits(self.u32()?);
+        let lut = match self.u32()? as usize {
+            0 => None,
+            side => {
+                let domain = self.floats(3)?;
+                let domain = Log2 {
+                    offset: domain[0],
+                    min: domain[1],
+                    max: domain[2],
+                };
+                let nodes = self.floats(side.checked_pow(3)?.checked_mul(3)?)?;
+                let nodes = nodes.chunks_exact(3).map(|n| [n[0], n[1], n[2]]);
+                Some(Lut::new(domain, side, nodes.collect())?)
+            }
+        };
+        exposure.is_finite().then_some(Display { exposure, lut })
+    }
+
     fn tile(&mut self, tile: &mut FilmTile) -> Option<()> {
         let ranges = self.u32()? as usize;
         if ranges as u64 > self.left / 8 {
@@ -397,10 +490,7 @@ impl Reader {
         tile.taken = Taken::new(ranges.collect())?;
         tile.sums = ExactSums::read(&self.bytes(tile.sums.bytes())?)?;
         let halves = tile.halves.as_flattened_mut().as_flattened_mut();
-        let saved = self.words(halves.len())?;
-        for (value, word) in halves.iter_mut().zip(saved) {
-            *value = f32::from_bits(word);
-        }
+        halves.copy_from_slice(&self.floats(halves.len())?);
         for counts in [&mut tile.left_out, &mut tile.aovs_left_out] {
             *counts = self.words(counts.len())?;
         }

@@ -107,6 +107,37 @@ impl Lut {
         })
     }
 
+    /// A table of these colours, in [0, 1] and red fastest, on `side` nodes per side; `None`
+    /// where they are no table's.
+    pub(crate) fn new(domain: Log2, side: usize, nodes: Vec<[f32; 3]>) -> Option<Self> {
+        let is_color = |&x: &f32| (0.0..=1.0).contains(&x);
+        let is_table = (2..=MOST).contains(&side)
+            && nodes.len() == side.pow(3)
+            && nodes.as_flattened().iter().all(is_color);
+        is_table.then_some(Self {
+            domain,
+            side,
+            nodes,
+        })
+    }
+
+    /// How values become places in the table.
+    #[must_use]
+    pub fn domain(&self) -> Log2 {
+        self.domain
+    }
+
+    /// Nodes per side.
+    #[must_use]
+    pub fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The colours of all nodes, red fastest, in [0, 1].
+    pub(crate) fn nodes(&self) -> &[[f32; 3]] {
+        &self.nodes
+    }
+
     /// The display's colour for a scene-linear one, by the tetrahedron of nodes around it;
     /// NaN counts as black.
     #[must_use]
@@ -175,6 +206,15 @@ mod tests {
             lut.look_up([f32::NAN, -3.0, f32::INFINITY]),
             [0.0, 0.0, 1.0]
         );
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        let table = |side: usize, node: f32| Lut::new(DOMAIN, side, vec![[node; 3]; 8]);
+        assert!(table(2, 0.5).is_some());
+        for (side, node) in [(0, 0.5), (1, 0.5), (3, 0.5), (2, 1.5), (2, f32::NAN)] {
+            assert_eq!(table(side, node), None, "{side}, {node}");
+        }
     }
 
     #[test]

@@ -81,6 +81,11 @@ impl OutputPath {
         &self.path
     }
 
+    /// Whether it is shown, and not scene-linear.
+    pub fn is_png(&self) -> bool {
+        self.format == Format::Png
+    }
+
     /// Makes the folder if there is none and tries to write a file into it. To
     /// be called before the render: hours later is too late to find out.
     ///

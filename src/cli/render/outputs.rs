@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use smithwalk::film::{Film, Identity, sidecar_path};
+use smithwalk::film::{Film, Origin, sidecar_path};
 use smithwalk::image::{OutputPath, check_output, read_exr};
 use smithwalk::numbered::Numbered;
 
@@ -112,15 +112,9 @@ impl Outputs {
 
     /// Saves the film if it is to stay, and else removes what checkpoints or an earlier
     /// run have left: a later --resume would go on from it.
-    pub fn keep_film(
-        &self,
-        film: &Film,
-        identity: &Identity,
-        target: u32,
-        interrupted: bool,
-    ) -> anyhow::Result<()> {
+    pub fn keep_film(&self, film: &Film, origin: &Origin, interrupted: bool) -> anyhow::Result<()> {
         if self.stays(interrupted) {
-            film.save(&self.film, identity, target)?;
+            film.save(&self.film, origin)?;
         } else if self.film.exists() {
             let path = self.film.display();
             std::fs::remove_file(&self.film).with_context(|| format!("can't remove {path}"))?;
@@ -133,10 +127,10 @@ impl Outputs {
     }
 
     /// Saves the film elsewhere when an output can't be written; says where.
-    pub fn rescue(&self, film: &Film, identity: &Identity, target: u32) -> String {
+    pub fn rescue(&self, film: &Film, origin: &Origin) -> String {
         let name = format!("smithwalk-{}.film", std::process::id());
         let place = std::env::temp_dir().join(name);
-        match film.save(&place, identity, target) {
+        match film.save(&place, origin) {
             Ok(()) => format!("all samples are in {}", place.display()),
             Err(error) => error.to_string(),
         }
