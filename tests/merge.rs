@@ -4,18 +4,18 @@ use std::path::Path;
 
 use crate::films::{Room, json, succeeds};
 
-/// Three of the four settings that PNGs have beside the light; the view is [`VIEW`].
-const SHOWN: &str =
-    "film: {width: 32, height: 24, exposure: 1.5, transparent: true, aovs: [variance, depth], ";
-const VIEW: &str = "view: {lut: view.cube, log2: {offset: 0.25, min: -2, max: 4}}}";
+/// What a plain PNG has not: exposure, alpha and a view transform.
+const FILM: &str =
+    "film: {width: 32, height: 24, exposure: 1.5, transparent: true, aovs: [variance, depth],
+  view: {lut: view.cube, log2: {offset: 0.25, min: -2, max: 4}}}";
 
-/// A room whose scene has these settings of the film.
-fn room(name: &str, film: &str) -> Room {
+/// A room whose scene is shown like that.
+fn room(name: &str) -> Room {
     let room = Room::new(name);
     let scene = std::fs::read_to_string(room.file("scene.yaml")).unwrap();
     let plain = "film: {width: 32, height: 24, exposure: 0}";
     assert!(scene.contains(plain));
-    room.write("scene.yaml", &scene.replace(plain, film));
+    room.write("scene.yaml", &scene.replace(plain, FILM));
     table(&room, 0.9);
     room
 }
@@ -56,7 +56,7 @@ fn bytes(room: &Room, name: &str) -> Vec<u8> {
 /// and attributes as EXR, but for the seconds of a run. It takes the films alone.
 #[test]
 fn merged_parts_look_like_the_whole() {
-    let room = room("look", &format!("{SHOWN}{VIEW}"));
+    let room = room("look");
     room.render(&["--spp", "8", "-o", "whole.png", "-o", "whole.exr"]);
     room.render(&["--spp", "8", "-o", "dark.png", "-D", "film.exposure=-1"]);
     room.render(&["--spp", "8", "-o", "plain.png", "-D", "film.view=null"]);
@@ -104,7 +104,7 @@ fn merged_parts_look_like_the_whole() {
 /// Parts that look different merge, since their samples do not, and it is told how.
 #[test]
 fn parts_that_look_different_are_told() {
-    let room = room("different", &format!("{SHOWN}{VIEW}"));
+    let room = room("different");
     room.render(&["--spp", "8", "-o", "whole.png"]);
     let told = |more: &[&str], expected: &[&str]| {
         let said = merge(&room, &["a.film", "b.film"], more, &["m.png"]);
@@ -138,7 +138,7 @@ fn parts_that_look_different_are_told() {
 /// parts say.
 #[test]
 fn films_that_do_not_say_how_they_look_are_told() {
-    let room = room("older", &format!("{SHOWN}{VIEW}"));
+    let room = room("older");
     room.render(&["--spp", "8", "-o", "whole.png"]);
     let plain = ["-D", "film.view=null", "-D", "film.exposure=0"];
     room.render(&[&["--spp", "8", "-o", "plain.png"][..], &plain].concat());
