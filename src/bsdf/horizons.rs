@@ -94,21 +94,21 @@ impl Horizons {
         (moved * side, density)
     }
 
-    /// From a true direction to the closure's, T⁻¹; `None` where the closure sends
-    /// nothing: below its horizon and above the true one.
+    /// From a true direction to the closure's, T⁻¹; where the closure sends nothing,
+    /// below its horizon and above the true one, `wi` itself with a factor of 0.
     #[inline(always)]
-    pub fn lower(&self, wi: Vec3) -> Option<Moved> {
+    pub fn lower(&self, wi: Vec3) -> Moved {
         let side = 1f32.copysign(wi.dot(self.geometric));
         let up = wi * side;
         let cos = up.dot(self.shading);
         if cos <= 0.0 {
-            return None;
+            return (wi, 0.0);
         }
         if !self.is_near(cos, up.dot(self.geometric)) {
-            return Some((wi, 1.0));
+            return (wi, 1.0);
         }
         let (moved, density) = self.unsqueeze(up);
-        Some((moved * side, density))
+        (moved * side, density)
     }
 
     /// The direction of a viewer above the true surface as the closure sees it. Where
@@ -122,7 +122,7 @@ impl Horizons {
         } else {
             wo
         };
-        self.lower(wo).map_or(wo, |(wo, _)| wo)
+        self.lower(wo).0
     }
 
     /// Whether a direction above the shading plane has ψ < S, from its cosines with
@@ -240,9 +240,8 @@ mod tests {
                 let sides = wi.dot(horizons.shading) * moved.dot(horizons.geometric);
                 assert!(sides > -1e-6, "{tilt}: {wi} and {moved}");
                 assert!((moved.length() - 1.0).abs() < 1e-5);
-                let Some((back, again)) = horizons.lower(moved) else {
-                    panic!("{tilt}: {wi} has no way back from {moved}");
-                };
+                let (back, again) = horizons.lower(moved);
+                assert!(again > 0.0, "{tilt}: {wi} has no way back from {moved}");
                 assert!((back - wi).length() < 2e-4, "{tilt}: {wi} came back {back}");
                 assert!((again / density - 1.0).abs() < 2e-2);
             }
@@ -261,11 +260,10 @@ mod tests {
                 let horizons = tilted(tilt, &mut rng);
                 let wi = direction(&mut rng);
                 let up = wi.dot(horizons.geometric) > 0.0;
-                let moved = horizons.lower(wi).filter(|_| up);
+                let (back, density) = horizons.lower(wi);
                 // Lambert's lobe about the shading normal.
-                let value = moved.map_or(0.0, |(back, density)| {
-                    4.0 * f64::from(back.dot(horizons.shading) * density)
-                });
+                let lobe = 4.0 * f64::from(back.dot(horizons.shading) * density);
+                let value = if up { lobe } else { 0.0 };
                 sum += value;
                 squares += value * value;
             }
@@ -284,7 +282,7 @@ mod tests {
             let wi = direction(&mut rng);
             let flat = Horizons::new(n, n);
             assert_eq!(flat.lift(wi), (wi, 1.0));
-            assert_eq!(flat.lower(wi), Some((wi, 1.0)));
+            assert_eq!(flat.lower(wi), (wi, 1.0));
             let smooth = tilted(0.2, &mut rng);
             let up = smooth.shading;
             assert_eq!(smooth.lift(up), (up, 1.0), "0.2 rad is far from π/2");

@@ -173,9 +173,10 @@ impl<const F: u32> Bsdf<F> {
         tally: &mut impl Tally<f32>,
     ) {
         for part in self.known() {
-            let Some(Seen { wo, wi, density }) = part.see(self.normal, wo, wi) else {
+            let Seen { wo, wi, density } = part.see(self.normal, wo, wi);
+            if density == 0.0 {
                 continue;
-            };
+            }
             if has::<F>(Features::RAY_VISIBILITY) && !kinds.contains(part.closure.kind(wi.z)) {
                 continue;
             }
@@ -214,9 +215,11 @@ impl<const F: u32> Bsdf<F> {
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let density = |part: &WeightedClosure| {
-            part.see(self.normal, wo, wi).map_or(0.0, |seen| {
-                part.closure.pdf(seen.wo, seen.wi) * seen.density
-            })
+            let seen = part.see(self.normal, wo, wi);
+            if seen.density == 0.0 {
+                return 0.0;
+            }
+            part.closure.pdf(seen.wo, seen.wi) * seen.density
         };
         if !has::<F>(Features::MIXES) {
             return self.known().next().map_or(0.0, density);
@@ -258,7 +261,8 @@ impl<const F: u32> Bsdf<F> {
 struct Seen {
     wo: Vec3,
     wi: Vec3,
-    /// The factor on densities over `wi`.
+    /// The factor on densities over `wi`; 0 where the closure sends nothing. (An
+    /// `Option` would pass through memory on the hottest path there is.)
     density: f32,
 }
 
@@ -268,17 +272,18 @@ impl WeightedClosure {
         Horizons::new(self.frame.z, geometric)
     }
 
-    /// Both directions in the closure's frame; `None` where it sends nothing.
+    /// Both directions in the closure's frame.
     #[inline(always)]
-    fn see(&self, geometric: Vec3, wo: Vec3, wi: Vec3) -> Option<Seen> {
+    fn see(&self, geometric: Vec3, wo: Vec3, wi: Vec3) -> Seen {
         let horizons = self.horizons(geometric);
-        let (moved, density) = horizons.lower(wi)?;
+        let (moved, density) = horizons.lower(wi);
         let local = self.frame.to_local(moved);
-        same_side(geometric, wi, local.z).then(|| Seen {
+        let lit = same_side(geometric, wi, local.z);
+        Seen {
             wo: self.frame.to_local(horizons.viewer(wo)),
             wi: local,
-            density,
-        })
+            density: if lit { density } else { 0.0 },
+        }
     }
 }
 
@@ -349,11 +354,9 @@ impl<const F: u32> InLanes<'_, F> {
         let mut local = [Vec3::NEG_Z; LANES];
         for (i, &wi) in wi.iter().enumerate() {
             // No light comes from below a metal.
-            let Some((moved, density)) = horizons.lower(wi) else {
-                continue;
-            };
+            let (moved, density) = horizons.lower(wi);
             let moved = self.part.frame.to_local(moved);
-            if moved.z > MIN_COS && same_side(self.normal, wi, moved.z) {
+            if density > 0.0 && moved.z > MIN_COS && same_side(self.normal, wi, moved.z) {
                 (local[i], densities[i]) = (moved, density);
             }
         }

@@ -118,11 +118,11 @@ impl<const F: u32> PathTracer<'_, F> {
     /// Follows a scattered path to its end.
     fn follow(&self, path: &mut Path, sampler: &mut Sampler) -> Found {
         let mut found = Found::default();
-        while let Some(surface) = self.next_surface(path, &mut found) {
+        while let Some(surface) = &self.next_surface(path, &mut found) {
             let mut bsdf = Bsdf::<F>::new(surface.geometric_normal);
-            self.scene.add_closures(&mut bsdf, &surface, path.view());
-            self.light_sample(path, &surface, &bsdf, sampler, &mut found);
-            if !self.scatter(path, &surface, &bsdf, sampler) {
+            self.scene.add_closures(&mut bsdf, surface, path.view());
+            self.light_sample(path, surface, &bsdf, sampler, &mut found);
+            if !self.scatter(path, surface, &bsdf, sampler) {
                 break;
             }
         }

@@ -343,7 +343,7 @@ impl Lights {
         u_select: f32,
         u: [f32; 2],
     ) -> Option<LightSample> {
-        let (sample, _) = self.sample_with_kinds(receiver, u_select, u)?;
+        let (sample, _) = self.sample_with_kinds(&receiver.into(), u_select, u)?;
         Some(sample)
     }
 
@@ -352,16 +352,15 @@ impl Lights {
     #[must_use]
     pub fn sample_with_kinds(
         &self,
-        receiver: impl Into<Receiver>,
+        receiver: &Receiver,
         u_select: f32,
         u: [f32; 2],
     ) -> Option<(LightSample, RayKinds)> {
-        let receiver = receiver.into();
         let p = receiver.position;
         let (index, selection, rest) =
             self.chooser
                 .as_ref()?
-                .choose(&receiver, u_select, u, |index| self.contribution(index, p))?;
+                .choose(receiver, u_select, u, |index| self.contribution(index, p))?;
         let candidate = self.candidate(index)?;
         let kinds = match candidate {
             Candidate::Lamp(light) => light.seen_by,

@@ -244,7 +244,6 @@ impl Scene {
             along_u,
             right_handed,
             in_box,
-            normal_to_world: object.normal_to_world,
         };
         match &mesh.normals {
             Some(normals) if has::<F>(Features::SMOOTH_NORMALS) => {

@@ -1,6 +1,6 @@
 //! A point on a surface, as a ray met it.
 
-use glam::{Mat3A, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use crate::bsdf::within_reach;
 use crate::description::Axis;
@@ -42,8 +42,6 @@ pub struct Surface {
     /// The hit in the box of the object's mesh, each side from −½ to ½; zero
     /// where nothing needs it.
     pub in_box: Vec3,
-    /// Takes normals from the object's space to the world's.
-    pub normal_to_world: Mat3A,
 }
 
 /// Who looks at a surface.
@@ -92,7 +90,6 @@ impl Surface {
             along_u: Vec3::X,
             right_handed: from_above,
             in_box: Vec3::X,
-            normal_to_world: Mat3A::IDENTITY,
         }
     }
 
@@ -136,15 +133,15 @@ impl Surface {
     }
 
     /// The tangent that runs round an axis of the object through the middle of
-    /// its mesh's box, as Cycles' default tangent does.
+    /// its mesh's box, as Cycles' default tangent does; in the object's space, as
+    /// a normal is.
     #[must_use]
     pub fn radial_tangent(&self, axis: Axis) -> Vec3 {
         let p = self.in_box;
-        let local = match axis {
+        match axis {
             Axis::X => Vec3::new(0.0, -p.z, p.y),
             Axis::Y => Vec3::new(p.z, 0.0, -p.x),
             Axis::Z => Vec3::new(-p.y, p.x, 0.0),
-        };
-        self.normal_to_world * local
+        }
     }
 }

@@ -90,7 +90,7 @@ impl<const F: u32> PathTracer<'_, F> {
         let position = sampler.get_2d(Dimension::light_position(path.vertex));
         let lights = &self.scene.lights;
         let receiver = self.scene.receiver(surface);
-        let (light, mut seen_by) = lights.sample_with_kinds(receiver, choice, position)?;
+        let (light, mut seen_by) = lights.sample_with_kinds(&receiver, choice, position)?;
         if has::<F>(Features::RAY_VISIBILITY) && has::<F>(Features::EMISSIVE_MESHES) {
             if let Some((EmitterId(emitter), _)) = light.emitter {
                 let object = self.scene.emitters[emitter as usize] as usize;

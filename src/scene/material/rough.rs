@@ -255,7 +255,11 @@ impl Tangent {
         let tangent = match self {
             Self::Any => return Frame::about(surface.normal),
             Self::Uv => surface.tangent_along_u(),
-            Self::Radial(axis) => surface.radial_tangent(axis),
+            Self::Radial(axis) => {
+                let local = surface.radial_tangent(axis);
+                let object = point.ground.on.map(|(object, _)| object);
+                object.map_or(local, |object| object.normal_to_world * local)
+            }
         };
         Frame::with_tangent(surface.normal, tangent, rotation.at::<F>(point))
     }
