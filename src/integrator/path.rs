@@ -119,6 +119,7 @@ impl<const F: u32> PathTracer<'_, F> {
     fn follow(&self, path: &mut Path, sampler: &mut Sampler) -> Found {
         let mut found = Found::default();
         while let Some(surface) = &self.next_surface(path, &mut found) {
+            sampler.begin_vertex(path.vertex);
             let mut bsdf = Bsdf::<F>::new(surface.geometric_normal);
             self.scene.add_closures(&mut bsdf, surface, path.view());
             self.light_sample(path, surface, &bsdf, sampler, &mut found);

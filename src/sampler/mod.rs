@@ -156,10 +156,26 @@ pub struct Sampler {
     key: u64,
     /// Index into the Sobol sequence.
     index: u32,
-    /// The set evaluated last, and its numbers. Neighbouring requests share
-    /// one: evaluating four dimensions costs as much as one.
-    cached_set: u32,
-    cached: [f32; 4],
+    /// The set evaluated last. Neighbouring requests share one: evaluating four
+    /// dimensions costs as much as one.
+    last: Set,
+    /// The set of a closure's sampler, where [`Self::begin_vertex`] has evaluated it.
+    ahead: Set,
+}
+
+/// Four numbers that are stratified jointly.
+#[derive(Clone, Copy, Debug)]
+struct Set {
+    /// Which; `u32::MAX` for none.
+    number: u32,
+    values: [f32; 4],
+}
+
+impl Set {
+    const NONE: Self = Self {
+        number: u32::MAX,
+        values: [0.0; 4],
+    };
 }
 
 impl Sampler {
@@ -171,8 +187,8 @@ impl Sampler {
             pixel_key: mix(mix(seed) ^ pixel),
             key: 0,
             index: 0,
-            cached_set: u32::MAX,
-            cached: [0.0; 4],
+            last: Set::NONE,
+            ahead: Set::NONE,
         };
         sampler.set_index(sample);
         sampler
@@ -198,7 +214,19 @@ impl Sampler {
         let sequence = u64::from(sample >> LOG2_SEQUENCE);
         self.key = mix(self.pixel_key.wrapping_add(sequence));
         self.index = sample & ((1 << LOG2_SEQUENCE) - 1);
-        self.cached_set = u32::MAX;
+        self.last = Set::NONE;
+        self.ahead = Set::NONE;
+    }
+
+    /// Evaluates the sets that most surfaces ask for at vertex `bounce`, both at once:
+    /// neither waits for the other's hash.
+    #[inline]
+    pub fn begin_vertex(&mut self, bounce: u32) {
+        [self.last, self.ahead] =
+            [Dimension::light_choice(bounce), Dimension::bsdf(bounce)].map(|dimension| Set {
+                number: dimension.set,
+                values: sobol_4d(self.index, self.set_key(dimension.set)),
+            });
     }
 
     /// One number in [0, 1).
@@ -228,12 +256,14 @@ impl Sampler {
     /// The stream of microsurface walks at vertex `bounce`.
     #[inline]
     pub fn walk_stream(&mut self, bounce: u32, purpose: Purpose) -> WalkStream {
+        let set = purpose.set(bounce);
+        let begun = self.ahead.number == set;
         WalkStream {
-            key: self.set_key(purpose.set(bounce)),
+            key: self.set_key(set),
             index: self.index,
-            numbers: [0.0; 4],
-            left: 0,
-            sets: 0,
+            numbers: self.ahead.values,
+            left: if begun { 4 } else { 0 },
+            sets: u32::from(begun),
             tail: None,
         }
     }
@@ -261,11 +291,13 @@ impl Sampler {
 
     #[inline]
     fn set(&mut self, set: u32) -> [f32; 4] {
-        if self.cached_set != set {
-            self.cached = sobol_4d(self.index, self.set_key(set));
-            self.cached_set = set;
+        if self.last.number != set {
+            self.last = Set {
+                number: set,
+                values: sobol_4d(self.index, self.set_key(set)),
+            };
         }
-        self.cached
+        self.last.values
     }
 
     #[inline]
