@@ -6,6 +6,7 @@ use crate::color::luminance;
 use crate::texture::EnvironmentImage;
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use wide::f32x4;
 
 /// The share of the mean luminance that light samples leave to BSDF samples.
 /// Less than 1, so that an image of one colour keeps a density.
@@ -191,11 +192,13 @@ impl Environment {
     /// Where a direction falls, in texels from the upper left corner.
     fn raster(&self, direction: Vec3) -> (f32, f32) {
         let d = self.to_image * direction;
-        let u = 0.5 - d.y.atan2(d.x) / TAU;
-        // asin(z), with its digits kept next to the poles.
-        let elevation = d.z.atan2(d.x.hypot(d.y));
+        let across = (d.x * d.x + d.y * d.y).sqrt();
+        // Azimuth and elevation at once; asin(z) would lose its digits next to the poles.
+        let [azimuth, elevation, ..] = f32x4::new([d.y, d.z, 0.0, 0.0])
+            .atan2(f32x4::new([d.x, across, 1.0, 1.0]))
+            .to_array();
         (
-            u * self.width as f32,
+            (0.5 - azimuth / TAU) * self.width as f32,
             (0.5 - elevation / PI) * self.height as f32,
         )
     }
