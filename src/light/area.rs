@@ -1,13 +1,14 @@
 //! Flat lights: rectangles and ellipses.
 
+use super::rectangle::SphericalRectangle;
 use super::tree::{Cone, Extent};
 use super::warp::unit_disk;
 use super::{LightSample, Rgb};
 use crate::color::luminance;
 use crate::embree::Ray;
-use glam::{DVec3, Mat3, Vec3};
+use glam::{Mat3, Vec3};
 use std::f32::consts::PI;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 /// The outline of an [`AreaLight`], in its local xy plane, centred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,10 +23,6 @@ pub enum Outline {
 /// chosen uniformly in area: the density in solid angle then varies by too
 /// little to pay for the spherical rectangle.
 const NEAR: f32 = 0.1;
-
-/// The smallest spherical rectangle, in sr, that is sampled as such: half way
-/// between what rounding costs (about 1e-12 sr) and what it gains.
-const LEAST_SOLID_ANGLE: f64 = 1e-6;
 
 /// The least full angle of a spread, in radians; parallel light would have an
 /// infinite radiance.
@@ -192,7 +189,10 @@ impl AreaLight {
         let window = self.window(local)?;
         let spherical = self.spherical(local, &window);
         let [x, y] = match (&spherical, self.as_ellipse(&window)) {
-            (Some(rectangle), _) => rectangle.sample(u, local, &window),
+            (Some(rectangle), _) => {
+                let [x, y] = rectangle.sample(u);
+                [local.x + local.z * x, local.y + local.z * y]
+            }
             (None, false) => [
                 window.x[0] + u[0] * (window.x[1] - window.x[0]),
                 window.y[0] + u[1] * (window.y[1] - window.y[0]),
@@ -306,7 +306,8 @@ impl AreaLight {
         if window.area() < NEAR * distance_squared {
             return None;
         }
-        SphericalRectangle::new(local, window)
+        let seen = |sides: [f32; 2], at: f32| sides.map(|side| (side - at) / local.z);
+        SphericalRectangle::new(seen(window.x, local.x), seen(window.y, local.y))
     }
 
     /// sr⁻¹.
@@ -318,7 +319,7 @@ impl AreaLight {
         cos: f32,
     ) -> f32 {
         match (spherical, self.as_ellipse(window)) {
-            (Some(rectangle), _) => (1.0 / rectangle.solid_angle) as f32,
+            (Some(rectangle), _) => 1.0 / rectangle.solid_angle(),
             (None, false) => distance / cos * (distance / window.area()),
             (None, true) => distance / cos * (distance / self.area),
         }
@@ -339,110 +340,4 @@ impl Outline {
             Self::Ellipse => std::f64::consts::PI,
         }
     }
-}
-
-/// A rectangle seen from a point, sampled uniformly in solid angle (Ureña,
-/// Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical
-/// Rectangles"; names as there). In f64: at grazing views angles that are known by
-/// their cosines lose half of the digits. The squares of an f32 stay within the range of f64.
-struct SphericalRectangle {
-    z0: f64,
-    b0: f64,
-    b1: f64,
-    /// e^(i·k); the angle itself would take arc cosines.
-    k: Turn,
-    solid_angle: f64,
-}
-
-/// An angle by its cosine and sine.
-#[derive(Clone, Copy)]
-struct Turn {
-    cos: f64,
-    sin: f64,
-}
-
-impl Turn {
-    /// An angle from 0 to π.
-    fn of_cos(cos: f64) -> Self {
-        let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
-        Self { cos, sin }
-    }
-
-    fn of(angle: f64) -> Self {
-        let (sin, cos) = angle.sin_cos();
-        Self { cos, sin }
-    }
-
-    /// The sum of two angles.
-    fn and(self, other: Self) -> Self {
-        Self {
-            cos: self.cos * other.cos - self.sin * other.sin,
-            sin: self.sin * other.cos + self.cos * other.sin,
-        }
-    }
-
-    fn back(self) -> Self {
-        Self {
-            sin: -self.sin,
-            ..self
-        }
-    }
-
-    /// The angle, from 0 to 2π; what rounding leaves of 0 may be less.
-    fn angle(self) -> f64 {
-        let angle = self.sin.atan2(self.cos);
-        if angle < -1e-9 { angle + TAU } else { angle }
-    }
-}
-
-impl SphericalRectangle {
-    /// `None` where it is too small to be worth it.
-    fn new(local: Vec3, window: &Window) -> Option<Self> {
-        let local = local.as_dvec3();
-        let (x, y) = relative(local, window);
-        let z0 = -local.z;
-        // The z of the inward normals of the planes through p and the edges.
-        let slope = |a: f64| a / (a * a + z0 * z0).sqrt();
-        let normals = [-slope(y[0]), slope(x[1]), slope(y[1]), -slope(x[0])];
-        let angle = |i: usize, j: usize| Turn::of_cos(-normals[i] * normals[j]);
-        let k = angle(2, 3).and(angle(3, 0)).back();
-        // Girard's theorem; what lies before the plane is less than 2π.
-        let solid_angle = angle(0, 1).and(angle(1, 2)).and(k.back()).angle();
-        (solid_angle > LEAST_SOLID_ANGLE).then_some(Self {
-            z0,
-            b0: normals[0],
-            b1: normals[2],
-            k,
-            solid_angle,
-        })
-    }
-
-    /// A point of the rectangle in the light's axes.
-    fn sample(&self, u: [f32; 2], local: Vec3, window: &Window) -> [f32; 2] {
-        let local = local.as_dvec3();
-        let (x, y) = relative(local, window);
-        let Turn { cos, sin } = Turn::of(f64::from(u[0]) * self.solid_angle).and(self.k);
-        let fu = (cos * self.b0 - self.b1) / sin;
-        let cu = (1.0_f64.copysign(fu) / (fu * fu + self.b0 * self.b0).sqrt()).clamp(-1.0, 1.0);
-        let xu = -cu * self.z0 / (1.0 - cu * cu).sqrt();
-        // Rounding can leave the rectangle, and 0/0 on its edge leaves the numbers.
-        let xu = if xu.is_nan() {
-            x[0]
-        } else {
-            xu.clamp(x[0], x[1])
-        };
-        let d = (xu * xu + self.z0 * self.z0).sqrt();
-        let h = y.map(|y| y / (y * y + d * d).sqrt());
-        let hv = h[0] + f64::from(u[1]) * (h[1] - h[0]);
-        let yv = (hv * d / (1.0 - hv * hv).max(f64::MIN_POSITIVE).sqrt()).clamp(y[0], y[1]);
-        [(xu + local.x) as f32, (yv + local.y) as f32]
-    }
-}
-
-/// The window's sides as seen from `local`.
-fn relative(local: DVec3, window: &Window) -> ([f64; 2], [f64; 2]) {
-    (
-        window.x.map(|x| f64::from(x) - local.x),
-        window.y.map(|y| f64::from(y) - local.y),
-    )
 }

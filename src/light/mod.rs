@@ -10,6 +10,7 @@
 mod area;
 mod environment;
 mod point;
+mod rectangle;
 mod resolve;
 mod select;
 mod sun;
