@@ -12,18 +12,13 @@
 //! sample counts of a pixel, and a path may be as long as it likes.
 
 mod lanes;
+mod sobol;
+mod walk;
 
 pub use lanes::LaneStream;
+pub use walk::WalkStream;
 
-use rand::Rng;
-use rand_pcg::Pcg32;
-use sobol_burley::parts::{owen_scramble_int4_rev, owen_scramble_rev};
-
-use smithwalk_model::Draw;
-
-/// Length of the Sobol sequence as a power of two; later samples start another
-/// one, scrambled afresh.
-const LOG2_SEQUENCE: u32 = 16;
+use sobol::{LOG2_SEQUENCE, sobol_4d};
 
 /// Sets of dimensions that belong to the camera: film and lens, time, pilots. A set that
 /// nobody draws from costs nothing, so there are some for what is to come: whoever needs
@@ -257,15 +252,8 @@ impl Sampler {
     #[inline]
     pub fn walk_stream(&mut self, bounce: u32, purpose: Purpose) -> WalkStream {
         let set = purpose.set(bounce);
-        let begun = self.ahead.number == set;
-        WalkStream {
-            key: self.set_key(set),
-            index: self.index,
-            numbers: self.ahead.values,
-            left: if begun { 4 } else { 0 },
-            sets: u32::from(begun),
-            tail: None,
-        }
+        let first = (self.ahead.number == set).then_some(self.ahead.values);
+        WalkStream::new(self.set_key(set), self.index, first)
     }
 
     /// Walks of several samples at once at vertex `bounce`, those with these indices.
@@ -306,161 +294,6 @@ impl Sampler {
     }
 }
 
-/// Sets of four stratified numbers that a walk has: enough for two orders.
-const WALK_SETS: u32 = 2;
-
-/// The random numbers of microsurface walks at one vertex, in [0, 1): stratified
-/// ones for the first orders of each, and any number of independent ones after
-/// them. Nothing is computed before it is asked for.
-#[derive(Clone, Debug)]
-pub struct WalkStream {
-    key: u64,
-    index: u32,
-    /// The current set; the last `left` are still to come.
-    numbers: [f32; 4],
-    left: usize,
-    /// Sets begun by this walk.
-    sets: u32,
-    tail: Option<Pcg32>,
-}
-
-impl WalkStream {
-    /// The next number, with 23 random bits or more; never 1.
-    #[inline]
-    pub fn next_f32(&mut self) -> f32 {
-        if self.left == 0 {
-            if self.sets == WALK_SETS {
-                return self.next_of_tail();
-            }
-            self.next_set();
-        }
-        self.left -= 1;
-        self.numbers[3 - self.left]
-    }
-
-    #[inline]
-    fn next_set(&mut self) {
-        if self.sets > 0 {
-            self.key = mix(self.key);
-        }
-        self.numbers = sobol_4d(self.index, self.key);
-        self.left = 4;
-        self.sets += 1;
-    }
-
-    fn next_of_tail(&mut self) -> f32 {
-        let (key, index) = (self.key, u64::from(self.index));
-        let tail = self
-            .tail
-            .get_or_insert_with(|| Pcg32::new(mix(key ^ (index << 32)), key));
-        // The 24 bits that a f32 below 1 can hold, hence never rounded up to 1.
-        (tail.next_u32() >> 8) as f32 * (1.0 / (1 << 24) as f32)
-    }
-}
-
-impl Draw<f32> for WalkStream {
-    #[inline]
-    fn draw(&mut self) -> f32 {
-        self.next_f32()
-    }
-
-    #[inline]
-    fn next_walk(&mut self) {
-        // Sets of its own, under other keys than those that are used up.
-        self.key = mix(self.key ^ u64::from(u32::MAX));
-        self.left = 0;
-        self.sets = 0;
-        self.tail = None;
-    }
-}
-
-/// Four dimensions of sample `index` < 2¹⁶ of the Sobol sequence scrambled by
-/// `key`, in [0, 1).
-///
-/// Bits are in reverse order, as the hash that stands for Owen's scrambling
-/// wants them. The index is scrambled too, which shuffles the sequence but keeps
-/// any 2^k first samples together with their strata, so that sets of different
-/// keys are independent.
-#[inline]
-fn sobol_4d(index: u32, key: u64) -> [f32; 4] {
-    let scrambles = [mix(key ^ 1), mix(key ^ 2)].map(|bits| [bits as u32, (bits >> 32) as u32]);
-    let index = owen_scramble_rev(index.reverse_bits(), (key >> 32) as u32);
-    let mut point = [0; 4];
-    for (nibble, vectors) in VECTORS.iter().enumerate() {
-        let terms = vectors[(index >> (28 - 4 * nibble)) as usize & 15];
-        for (point, term) in point.iter_mut().zip(terms) {
-            *point ^= term;
-        }
-    }
-    let [[a, b], [c, d]] = scrambles;
-    owen_scramble_int4_rev(point.into(), [a, b, c, d].into())
-        .reverse_bits()
-        .to_f32_norm()
-}
-
-/// The sums (XOR) of direction vectors that belong to each value of each four
-/// bits of a reversed 16-bit index, for four dimensions at a time. Adding up one
-/// bit at a time takes several times as long, for want of predictable branches.
-static VECTORS: [[[u32; 4]; 16]; LOG2_SEQUENCE as usize / 4] = {
-    let mut sums = [[[0; 4]; 16]; LOG2_SEQUENCE as usize / 4];
-    let mut dimension = 0;
-    while dimension < 4 {
-        let vectors = direction_vectors(DIRECTIONS[dimension]);
-        let mut bit = 0;
-        while bit < LOG2_SEQUENCE as usize {
-            let mut value = 0;
-            while value < 16 {
-                // The first bit of a reversed index is its highest.
-                if (value >> (3 - bit % 4)) & 1 == 1 {
-                    sums[bit / 4][value][dimension] ^= vectors[bit].reverse_bits();
-                }
-                value += 1;
-            }
-            bit += 1;
-        }
-        dimension += 1;
-    }
-    sums
-};
-
-/// Degree, inner coefficients of the primitive polynomial, and initial direction
-/// numbers of Sobol's first dimensions (Joe and Kuo 2008, "Constructing Sobol
-/// Sequences with Better Two-Dimensional Projections", SIAM J. Sci. Comput.
-/// 30(5)). The first dimension has none: van der Corput's sequence.
-const DIRECTIONS: [(usize, u32, [u32; 3]); 4] = [
-    (0, 0, [0; 3]),
-    (1, 0, [1, 0, 0]),
-    (2, 1, [1, 3, 0]),
-    (3, 1, [1, 3, 1]),
-];
-
-/// Direction vectors v₁ … v₁₆ as binary fractions, from their recurrence.
-const fn direction_vectors(
-    (degree, coefficients, initial): (usize, u32, [u32; 3]),
-) -> [u32; LOG2_SEQUENCE as usize] {
-    let mut vectors = [0; LOG2_SEQUENCE as usize];
-    let mut k = 0;
-    while k < vectors.len() {
-        vectors[k] = if degree == 0 {
-            1 << (31 - k)
-        } else if k < degree {
-            initial[k] << (31 - k)
-        } else {
-            let mut vector = vectors[k - degree] ^ (vectors[k - degree] >> degree);
-            let mut term = 1;
-            while term < degree {
-                if (coefficients >> (degree - 1 - term)) & 1 == 1 {
-                    vector ^= vectors[k - term];
-                }
-                term += 1;
-            }
-            vector
-        };
-        k += 1;
-    }
-    vectors
-}
-
 /// The finaliser of SplitMix64 (Steele, Lea, Flood 2014, "Fast Splittable
 /// Pseudorandom Number Generators", with the constants of Stafford's mix 13)
 /// behind one step of its counter, so that 0 is no fixed point.
@@ -474,8 +307,8 @@ const fn mix(x: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use super::walk::WALK_SETS;
     use super::*;
-    use sobol_burley::parts::Int4;
 
     /// Every dimension of the first two vertices, by name.
     fn layout() -> Vec<(Dimension, usize)> {
@@ -535,6 +368,25 @@ mod tests {
         assert_eq!(forward, numbers(&mut layout().into_iter().rev()));
         let only_roulette = Sampler::new(7, [3, 5], 11).get_1d(Dimension::roulette(1));
         assert!(forward.iter().any(|f| f.2 == only_roulette.to_bits()));
+    }
+
+    #[test]
+    fn a_vertex_begun_at_once_has_the_same_numbers() {
+        for bounce in 0..3 {
+            let mut begun = Sampler::new(7, [3, 5], 11);
+            let mut plain = begun.clone();
+            begun.begin_vertex(bounce);
+            for purpose in [Purpose::Sample, Purpose::Light] {
+                let mut walks = [&mut begun, &mut plain].map(|s| s.walk_stream(bounce, purpose));
+                for _ in 0..12 {
+                    let [a, b] = walks.each_mut().map(WalkStream::next_f32);
+                    assert_eq!(a, b, "{bounce} {purpose:?}");
+                }
+            }
+            for (dimension, _) in layout() {
+                assert_eq!(begun.get_1d(dimension), plain.get_1d(dimension));
+            }
+        }
     }
 
     /// Any 2^k first samples fall into the 2^k strata of each dimension, and of
@@ -638,29 +490,5 @@ mod tests {
         let n = f64::from(STREAMS * DRAWS);
         assert!((sum / n - 0.5).abs() < 5.0 / (12.0 * n).sqrt());
         assert!((squares / n - 1.0 / 3.0).abs() < 5.0 * (4.0 / 45.0 / n).sqrt());
-    }
-
-    /// The points before scrambling, against an independent implementation.
-    #[test]
-    fn direction_vectors_are_sobols() {
-        for index in (0..1 << 16).step_by(37) {
-            let reversed = (index as u32).reverse_bits();
-            for dimension in 0..4 {
-                let nibbles = VECTORS.iter().enumerate();
-                let terms =
-                    nibbles.map(|(i, v)| v[(reversed >> (28 - 4 * i)) as usize & 15][dimension]);
-                let expected = sobol_burley::parts::sobol_rev(reversed, dimension as u32);
-                let found = terms.fold(0, |sum, term| sum ^ term);
-                assert_eq!(found, expected, "sample {index}, dimension {dimension}");
-            }
-        }
-    }
-
-    /// The largest words that Sobol and PCG can give stay below 1.
-    #[test]
-    fn the_largest_number_is_below_one() {
-        assert!((u32::MAX >> 8) as f32 * (1.0 / (1 << 24) as f32) < 1.0);
-        let largest = Int4::from([u32::MAX; 4]);
-        assert!(largest.to_f32_norm().iter().all(|&u| u < 1.0));
     }
 }
