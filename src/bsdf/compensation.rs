@@ -21,7 +21,7 @@
 //! its colour for F̄; diffuse facets likewise with their albedo.
 
 use std::fmt;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use rayon::prelude::*;
 
@@ -247,6 +247,12 @@ fn mean_over_hemisphere(row: &[f32; COSINES]) -> f32 {
     4.0 * step / 3.0 * row.iter().enumerate().map(term).sum::<f32>()
 }
 
+/// The leading coordinates of the points that all nodes of all tables take.
+static POINTS: LazyLock<Vec<[f32; 4]>> = LazyLock::new(|| {
+    let point = |index| [0, 1, 2, 3].map(|dimension| sobol_burley::sample(index, dimension, 0));
+    (0..SAMPLES).map(point).collect()
+});
+
 /// One Owen-scrambled Sobol point, coordinate after coordinate.
 pub(super) struct SobolPoint {
     index: u32,
@@ -264,8 +270,13 @@ impl SobolPoint {
 
 impl Draw<f32> for SobolPoint {
     fn draw(&mut self) -> f32 {
+        let dimension = self.dimension;
         self.dimension += 1;
-        sobol_burley::sample(self.index, self.dimension - 1, 0)
+        let leading = POINTS.get(self.index as usize);
+        match leading.and_then(|point| point.get(dimension as usize)) {
+            Some(&coordinate) => coordinate,
+            None => sobol_burley::sample(self.index, dimension, 0),
+        }
     }
 }
 
