@@ -93,8 +93,8 @@ def main():
     text = f"""\
 One image each at {args.percent} % of the scenes' sizes, one run of `benches/peers/denoised.py`: FLIP,
 the mean over the pixels, against the renderer's own image of {args.reference_spp} samples
-(Cycles: {4 * args.reference_spp}), which is denoised too; CPU seconds of rendering and denoising on a machine that others used as well. `auto` here, Multiscatter
-GGX in Cycles; both denoise by Open Image Denoise with albedo and normal. Mitsuba's denoiser is
+(Cycles: {4 * args.reference_spp}), which is denoised too; CPU seconds of rendering and denoising, less those of a
+few pixels. `auto` here, Multiscatter GGX in Cycles; both denoise by Open Image Denoise with albedo and normal. Mitsuba's denoiser is
 OptiX', which needs a graphics card, and Debian's Blender 3.4 has none.
 
 """ + "\n".join(lines)

@@ -145,7 +145,7 @@ def page(args, raced, missing):
     text = f"""\
 Every renderer against its own converged images, noise alone: relMSE (ε = 0.01, the worst
 0.1 % of the pixels left out) × CPU seconds, {args.seeds} images each at {args.percent} % of the scenes'
-sizes, {os.cpu_count()} threads of a machine that others used as well, one run of
+sizes, {os.cpu_count()} threads, one run of
 `benches/peers/race.py`: the ratios of CPU times count. Samples are such that images take about
 as long; {args.reference_spp / args.spp[-1]:g} × as many make each of the two references, whose noise is taken off. Times are
 of rendering alone: those of the scene's hand-over, which a render of a few pixels tells, are
