@@ -206,6 +206,11 @@ mod tests {
                 let [to, _] = rectangle.sample([u, 0.5]);
                 let share = quadrature([x[0], to], y) / all;
                 assert!((share - u).abs() < 1e-3, "{x:?} {y:?}: {share} for {u}");
+                // Along a line of points with the same u[0].
+                let [at, to] = rectangle.sample([0.3, u]);
+                let line = [at, at + 1e-6];
+                let share = quadrature(line, [y[0], to]) / quadrature(line, y);
+                assert!((share - u).abs() < 1e-3, "{x:?} {y:?}: {share} for {u}");
             }
         }
     }

@@ -32,9 +32,20 @@ fn encode_exr() -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// A small image in every format, with its extension.
+fn whole_files() -> [(&'static str, Vec<u8>); 5] {
+    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
+    [
+        ("png", encode(Png)),
+        ("jpg", encode(Jpeg)),
+        ("tif", encode(Tiff)),
+        ("hdr", encode(Hdr)),
+        ("exr", encode_exr()),
+    ]
+}
+
 #[test]
 fn images() {
-    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
     let directory = directory("bad-images");
     let load = |name: &str| {
         Texture::load(
@@ -48,13 +59,7 @@ fn images() {
         .map(|_| ())
     };
     let mut said = String::new();
-    let whole = [
-        ("png", encode(Png)),
-        ("jpg", encode(Jpeg)),
-        ("tif", encode(Tiff)),
-        ("hdr", encode(Hdr)),
-        ("exr", encode_exr()),
-    ];
+    let whole = whole_files();
     for (extension, bytes) in &whole {
         std::fs::write(directory.join(format!("whole.{extension}")), bytes).unwrap();
         assert_eq!(load(&format!("whole.{extension}")), Ok(()), "{extension}");
@@ -97,15 +102,8 @@ fn images() {
 /// Flips bytes of whole images, from a fixed seed: each is read or refused.
 #[test]
 fn mutated_images_never_panic() {
-    use image::ImageFormat::{Hdr, Jpeg, Png, Tiff};
     let directory = directory("mutated-images");
-    let whole = [
-        ("png", encode(Png)),
-        ("jpg", encode(Jpeg)),
-        ("tif", encode(Tiff)),
-        ("hdr", encode(Hdr)),
-        ("exr", encode_exr()),
-    ];
+    let whole = whole_files();
     let mut rng = rand_pcg::Pcg64Mcg::new(11);
     let mut below = |n: usize| (rand::Rng::next_u64(&mut rng) % n as u64) as usize;
     for (extension, bytes) in whole {
