@@ -61,6 +61,8 @@ impl<const F: u32> PathTracer<'_, F> {
             lanes.as_ref().filter(|_| worth)
         };
 
+        trunk.branches_per_light_sample =
+            split.branches.len() as f32 / split.light_samples.len() as f32;
         let mut result = PathResult {
             first: self
                 .describe_first
@@ -252,8 +254,10 @@ impl<const F: u32> PathTracer<'_, F> {
         path.last = Vertex {
             receiver: self.scene.receiver(surface),
             pdf,
+            branches_per_light_sample: path.branches_per_light_sample,
             travelled: 0.0,
         };
+        path.branches_per_light_sample = 1.0;
         let throughput = path.throughput.max_element();
         let survival = path.survival.chance(path.bounce, path.kind, throughput);
         if survival >= 1.0 {

@@ -215,6 +215,7 @@ impl AreaLight {
             radiance: self.emitted(cos),
             pdf: selection * self.pdf(spherical.as_ref(), &window, distance, cos),
             delta: false,
+            surrounds: false,
             emitter: None,
         })
     }

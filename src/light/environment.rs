@@ -168,6 +168,7 @@ impl Environment {
             radiance: self.bilinear(column, row),
             pdf: selection * row_probability * texel_probability * self.per_steradian(y),
             delta: false,
+            surrounds: true,
             emitter: None,
         }
     }

@@ -68,6 +68,8 @@ pub struct LightSample {
     pub pdf: f32,
     /// Whether the light has no extent, so that no ray meets it.
     pub delta: bool,
+    /// Whether it is of the image that surrounds the scene.
+    pub surrounds: bool,
     /// The emissive triangle that was chosen and the barycentric weights of
     /// its second and third vertex. `radiance` is then the one that
     /// [`EmissiveTriangle`] gave: where the emission has a texture, look it up

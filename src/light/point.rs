@@ -182,6 +182,7 @@ impl PointLight {
                 radiance: self.intensity * self.beamed(direction) / distance / distance,
                 pdf: selection,
                 delta: true,
+                surrounds: false,
                 emitter: None,
             });
         }
@@ -193,6 +194,7 @@ impl PointLight {
             radiance: self.radiance() * self.beamed(direction),
             pdf: selection * view.cone.pdf(),
             delta: false,
+            surrounds: false,
             emitter: None,
         })
     }

@@ -132,6 +132,7 @@ impl SunLight {
             radiance,
             pdf,
             delta,
+            surrounds: false,
             emitter: None,
         }
     }

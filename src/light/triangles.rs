@@ -140,6 +140,7 @@ impl Triangles {
             radiance,
             pdf: per_steradian(density, distance, direction.dot(normal)),
             delta: false,
+            surrounds: false,
             emitter: Some((EmitterId(index as u32), [v, w])),
         })
     }

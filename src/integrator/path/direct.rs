@@ -102,6 +102,11 @@ impl<const F: u32> PathTracer<'_, F> {
             return None;
         }
         let radiance = self.visible(path, surface, &light, rays)?;
+        let pdf = if has::<F>(Features::ENVIRONMENT) && light.surrounds {
+            pdf * path.branches_per_light_sample
+        } else {
+            pdf
+        };
         // The power heuristic's weight over the density; a delta light has no rival.
         let factor = if light.delta {
             1.0 / light.pdf

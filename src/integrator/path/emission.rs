@@ -53,7 +53,7 @@ impl<const F: u32> PathTracer<'_, F> {
             radiance *= path.media.transmittance(f32::INFINITY);
         }
         if has::<F>(Features::LIGHT_SAMPLING) {
-            radiance * path.last.mis_weight(light_pdf)
+            radiance * path.last.mis_weight_of_surroundings(light_pdf)
         } else {
             radiance
         }

@@ -35,6 +35,9 @@ pub(super) struct Path {
     /// How wide a pixel is along the ray, where something needs it; reflection and
     /// refraction leave it its spread.
     pub cone: Cone,
+    /// Branches for each light sample at the surface that it comes to; 1 but where it
+    /// splits.
+    pub branches_per_light_sample: f32,
 }
 
 /// The last vertex that light samples could have continued from.
@@ -45,6 +48,8 @@ pub(super) struct Vertex {
     /// Density of the direction taken, sr⁻¹; `None` where no light sample
     /// competes: at the camera and after single directions.
     pub pdf: Option<f32>,
+    /// How often that was, for each light sample there.
+    pub branches_per_light_sample: f32,
     /// Distance from there to where the current ray starts: more than
     /// zero after passing straight through surfaces.
     pub travelled: f32,
@@ -59,6 +64,7 @@ impl Path {
             last: Vertex {
                 receiver: ray.origin.into(),
                 pdf: None,
+                branches_per_light_sample: 1.0,
                 travelled: 0.0,
             },
             vertex: 0,
@@ -68,6 +74,7 @@ impl Path {
             kind: RayKind::Camera,
             survival,
             cone,
+            branches_per_light_sample: 1.0,
         }
     }
 
@@ -126,5 +133,13 @@ impl Vertex {
             Some(pdf) => pdf * pdf / (pdf * pdf + light_pdf * light_pdf),
             None => 1.0,
         }
+    }
+
+    /// As [`Self::mis_weight`], of a direction to the image that surrounds the scene.
+    /// Samples of an image differ as much as those of a BSDF do, so that the numbers of
+    /// both count (Veach 1997, eq. 9.13). Those of lamps differ little from the first one
+    /// on, as they are uniform in solid angle or close to it.
+    pub fn mis_weight_of_surroundings(&self, light_pdf: f32) -> f32 {
+        self.mis_weight(light_pdf / self.branches_per_light_sample)
     }
 }
