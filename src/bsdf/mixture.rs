@@ -36,6 +36,8 @@ pub struct ScatterSample {
     pub wi: Vec3,
     /// f·|cosθ_i| over the density of `wi`.
     pub weight: Rgb,
+    /// [`Bsdf::pdf`] of `wi`, sr⁻¹, in code for scenes with lights to sample.
+    pub pdf: f32,
     /// Facets met; 1 is single scattering.
     pub order: u32,
     /// Whether the closure scatters into single directions, which no light
@@ -107,14 +109,24 @@ impl<const F: u32> Bsdf<F> {
             return None;
         }
         let horizons = part.horizons(self.normal);
-        let wo = part.frame.to_local(horizons.viewer(wo));
+        let towards = wo;
+        let wo = part.frame.to_local(horizons.viewer(towards));
         let sample = part.closure.sample(wo, rng)?;
-        let (wi, _) = horizons.lift(part.frame.to_world(sample.wi));
+        let (wi, density) = horizons.lift(part.frame.to_world(sample.wi));
         if !same_side(self.normal, wi, sample.wi.z) {
             return None;
         }
+        let pdf = if !has::<F>(Features::LIGHT_SAMPLING) || sample.delta {
+            0.0
+        } else if self.closures.len() == 1 {
+            // Both directions are in its frame already.
+            part.closure.pdf(wo, sample.wi) * density
+        } else {
+            self.pdf(towards, wi)
+        };
         Some(ScatterSample {
             wi,
+            pdf,
             weight: if has::<F>(Features::MIXES) {
                 sample.weight * (part.weight / part.chance * self.total)
             } else {
@@ -302,14 +314,10 @@ pub struct InLanes<'a, const F: u32> {
 }
 
 impl<const F: u32> InLanes<'_, F> {
-    /// Eight times [`Bsdf::sample`], each with the [`Bsdf::pdf`] of its direction.
+    /// Eight times [`Bsdf::sample`].
     #[must_use]
     #[inline]
-    pub fn sample(
-        &self,
-        wo: Vec3,
-        rng: &mut impl Draw<f32x8>,
-    ) -> [Option<(ScatterSample, f32)>; LANES] {
+    pub fn sample(&self, wo: Vec3, rng: &mut impl Draw<f32x8>) -> [Option<ScatterSample>; LANES] {
         let horizons = self.part.horizons(self.normal);
         let wo = self.part.frame.to_local(horizons.viewer(wo));
         if wo.z.is_nan() || wo.z <= MIN_COS {
@@ -327,12 +335,13 @@ impl<const F: u32> InLanes<'_, F> {
             let sample = ScatterSample {
                 wi,
                 weight: sample.weight * self.part.weight,
+                pdf: pdf * density,
                 order: sample.order,
                 delta: false,
                 straight: false,
                 kind: RayKind::Glossy,
             };
-            lit.then_some((sample, pdf * density))
+            lit.then_some(sample)
         })
     }
 

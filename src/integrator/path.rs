@@ -219,13 +219,11 @@ impl<const F: u32> PathTracer<'_, F> {
         let Some(sample) = bsdf.sample(wo, choice, &mut stream) else {
             return false;
         };
-        let rivals = has::<F>(Features::LIGHT_SAMPLING) && !sample.delta;
-        let pdf = rivals.then(|| bsdf.pdf(wo, sample.wi));
-        self.go_on(path, surface, sampler, sample, pdf)
+        self.go_on(path, surface, sampler, sample)
     }
 
-    /// Goes on in the direction of a BSDF sample, which has this density where light
-    /// samples compete; false when Russian roulette ends the path.
+    /// Goes on in the direction of a BSDF sample; false when Russian roulette ends the
+    /// path.
     #[inline(always)]
     fn go_on(
         &self,
@@ -233,7 +231,6 @@ impl<const F: u32> PathTracer<'_, F> {
         surface: &Surface,
         sampler: &mut Sampler,
         sample: ScatterSample,
-        pdf: Option<f32>,
     ) -> bool {
         path.throughput *= sample.weight;
         if has::<F>(Features::TRANSPARENCY) && sample.straight {
@@ -253,7 +250,7 @@ impl<const F: u32> PathTracer<'_, F> {
         path.kind = sample.kind;
         path.last = Vertex {
             receiver: self.scene.receiver(surface),
-            pdf,
+            pdf: (has::<F>(Features::LIGHT_SAMPLING) && !sample.delta).then_some(sample.pdf),
             branches_per_light_sample: path.branches_per_light_sample,
             travelled: 0.0,
         };

@@ -87,9 +87,8 @@ impl<const F: u32> PathTracer<'_, F> {
             for (index, sample) in (first..indices.end).zip(samples) {
                 sampler.set_index(index);
                 let mut branch = trunk.clone();
-                let goes_on = sample.is_some_and(|(sample, pdf)| {
-                    self.go_on(&mut branch, surface, sampler, sample, Some(pdf))
-                });
+                let goes_on =
+                    sample.is_some_and(|sample| self.go_on(&mut branch, surface, sampler, sample));
                 if goes_on {
                     mean.add(self.follow(&mut branch, sampler));
                 }
