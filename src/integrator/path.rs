@@ -233,6 +233,8 @@ impl<const F: u32> PathTracer<'_, F> {
         sample: ScatterSample,
     ) -> bool {
         path.throughput *= sample.weight;
+        // What it comes to next has one light sample for it.
+        let branches_per_light_sample = std::mem::replace(&mut path.branches_per_light_sample, 1.0);
         if has::<F>(Features::TRANSPARENCY) && sample.straight {
             // Goes on as if nothing had been there.
             self.cross(path, surface);
@@ -251,10 +253,9 @@ impl<const F: u32> PathTracer<'_, F> {
         path.last = Vertex {
             receiver: self.scene.receiver(surface),
             pdf: (has::<F>(Features::LIGHT_SAMPLING) && !sample.delta).then_some(sample.pdf),
-            branches_per_light_sample: path.branches_per_light_sample,
+            branches_per_light_sample,
             travelled: 0.0,
         };
-        path.branches_per_light_sample = 1.0;
         let throughput = path.throughput.max_element();
         let survival = path.survival.chance(path.bounce, path.kind, throughput);
         if survival >= 1.0 {
