@@ -109,9 +109,8 @@ impl<const F: u32> Bsdf<F> {
             return None;
         }
         let horizons = part.horizons(self.normal);
-        let towards = wo;
-        let wo = part.frame.to_local(horizons.viewer(towards));
-        let sample = part.closure.sample(wo, rng)?;
+        let local = part.frame.to_local(horizons.viewer(wo));
+        let sample = part.closure.sample(local, rng)?;
         let (wi, density) = horizons.lift(part.frame.to_world(sample.wi));
         if !same_side(self.normal, wi, sample.wi.z) {
             return None;
@@ -120,9 +119,9 @@ impl<const F: u32> Bsdf<F> {
             0.0
         } else if self.closures.len() == 1 {
             // Both directions are in its frame already.
-            part.closure.pdf(wo, sample.wi) * density
+            part.closure.pdf(local, sample.wi) * density
         } else {
-            self.pdf(towards, wi)
+            self.pdf(wo, wi)
         };
         Some(ScatterSample {
             wi,

@@ -48,7 +48,7 @@ pub(super) struct Vertex {
     /// Density of the direction taken, sr⁻¹; `None` where no light sample
     /// competes: at the camera and after single directions.
     pub pdf: Option<f32>,
-    /// How often that was, for each light sample there.
+    /// Branches for each light sample there.
     pub branches_per_light_sample: f32,
     /// Distance from there to where the current ray starts: more than
     /// zero after passing straight through surfaces.
