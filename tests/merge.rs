@@ -101,6 +101,24 @@ fn merged_parts_look_like_the_whole() {
     assert_eq!(told["display"]["view"]["log2"]["min"], -2.0);
 }
 
+/// What an image is complete by is the table's colours, wherever they lie.
+#[test]
+fn a_view_transform_counts_by_its_colours() {
+    let room = room("colours");
+    let mark = |name: &str, more: &[&str]| {
+        room.render(&[&["--spp", "1", "-o", name][..], more].concat());
+        room.image(name).attribute("smithwalk.complete").map(str::to_owned)
+    };
+    let first = mark("a.exr", &[]);
+    assert!(first.is_some());
+    let table = String::from_utf8(bytes(&room, "view.cube")).unwrap();
+    room.write("moved.cube", &table);
+    let moved = mark("b.exr", &["-D", "film.view.lut=moved.cube"]);
+    assert_eq!(moved, first);
+    self::table(&room, 0.25);
+    assert_ne!(mark("c.exr", &[]), first);
+}
+
 /// Parts that look different merge, since their samples do not, and it is told how.
 #[test]
 fn parts_that_look_different_are_told() {
@@ -115,6 +133,10 @@ fn parts_that_look_different_are_told() {
         bytes(&room, "m.png") == bytes(&room, "whole.png")
     };
     let as_first = ["b.film has ", "; PNGs are as ", "a.film says"];
+
+    halves(&room, &["-D", "film.exposure=0.7"]);
+    let digits = json(&["film", &room.file("b.film"), "--json"]);
+    assert_eq!(digits["display"]["exposure"], 0.7);
 
     halves(&room, &["-D", "film.exposure=-0.5"]);
     let exposure = ["exposure -0.5, not 1.5"];

@@ -37,9 +37,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
             "aovs": aovs, "noise": noise,
             "scene": origin.finish.as_ref().map(|finish| &finish.scene),
             "display": display.map(|display| json!({
-                "exposure": display.exposure,
+                "exposure": shortest(display.exposure),
                 "view": display.lut.as_ref().map(|lut| {
                     let Log2 { offset, min, max } = lut.domain();
+                    let [offset, min, max] = [offset, min, max].map(shortest);
                     let log2 = json!({ "offset": offset, "min": min, "max": max });
                     json!({ "nodes": lut.side(), "log2": log2 })
                 }),
@@ -83,4 +84,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> anyhow::Result<ExitCode> {
         writeln!(out, "  {name}: {value}")?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The number whose digits are the fewest that tell `x`: 0.7 is not to become 0.699999988.
+fn shortest(x: f32) -> f64 {
+    x.to_string().parse().expect("digits of a number")
 }

@@ -323,7 +323,7 @@ impl Shot<'_> {
         let seconds = ("smithwalk.seconds".to_owned(), seconds);
         image.attributes.push(seconds);
         if !interrupted {
-            let mark = complete_mark(identity, description, &settings);
+            let mark = complete_mark(identity, description, &settings, display);
             image.attributes.push((COMPLETE.to_owned(), mark));
         }
         // One that fails must not keep the others from being written.
@@ -369,7 +369,7 @@ impl Shot<'_> {
             target,
             finish: Some(Finish {
                 scene: self.args.scene.scene.display().to_string(),
-                complete: complete_mark(identity, self.description, &whole),
+                complete: complete_mark(identity, self.description, &whole, self.display),
                 display: self.display.clone(),
             }),
         }
@@ -387,11 +387,13 @@ impl Shot<'_> {
 /// The attribute of complete images.
 pub const COMPLETE: &str = "smithwalk.complete";
 
-/// A hash of all that decides about a complete image.
+/// A hash of all that decides about a complete image; the table of a view transform
+/// counts by its colours, wherever it lies.
 fn complete_mark(
     identity: &Identity,
     description: &Description,
     settings: &RenderSettings,
+    display: &Display,
 ) -> String {
     let RenderSettings {
         window,
@@ -399,10 +401,9 @@ fn complete_mark(
         limits,
         ..
     } = settings;
-    let all = format!(
-        "{identity:?} {:?} {window:?} {share:?} {limits:?}",
-        description.film
-    );
+    let mut film = description.film.clone();
+    film.view = None;
+    let all = format!("{identity:?} {film:?} {display:?} {window:?} {share:?} {limits:?}");
     format!("{:032x}", xxh3_128(all.as_bytes()))
 }
 

@@ -53,7 +53,7 @@ pub fn run(
             break;
         }
         let display = display(description)?;
-        let mark = complete_mark(&resolved.identity, description, &settings);
+        let mark = complete_mark(&resolved.identity, description, &settings, &display);
         if args.resume && outputs.are_complete(&mark) {
             printed = printed.and(line(out, format_args!("frame {number} is complete")));
         } else {
