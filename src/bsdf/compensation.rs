@@ -284,6 +284,13 @@ impl Draw<f32> for SobolPoint {
 pub trait MeanWeight: Facets<Scalar = f32> {
     /// F̄ = 2 ∫ F cosθ d(cosθ): the mean share that one facet does not absorb.
     fn mean_weight(&self) -> Rgb<f32>;
+
+    /// The share that a facet keeps of light at 60°, in the channel where it is largest;
+    /// 1 for facets that hardly absorb.
+    #[inline]
+    fn weight_aslant(&self) -> f32 {
+        1.0
+    }
 }
 
 impl MeanWeight for Conductor<f32> {
@@ -300,6 +307,15 @@ impl MeanWeight for Conductor<f32> {
                 }
                 sum
             }
+        }
+    }
+
+    #[inline]
+    fn weight_aslant(&self) -> f32 {
+        match self.fresnel {
+            // A film's colour takes longer to find than the orders that it could save.
+            ConductorFresnel::Film { .. } => 1.0,
+            fresnel => fresnel.reflectance(0.5).max_channel(),
         }
     }
 }

@@ -54,9 +54,9 @@ impl Method {
     }
 }
 
-/// How often orders above the first are evaluated: the square of this times Λ,
-/// always from a Λ of 1/128 on. This and [`TURN`] are the roundest that measured well
-/// (docs/estimators.md).
+/// How often orders above the first are evaluated: the square of this times Λ times
+/// the square of what a facet reflects, on white facets always from a Λ of 1/128 on.
+/// This and [`TURN`] are the roundest that measured well (docs/estimators.md).
 const ROOT_CHANCE_PER_LAMBDA: f32 = 128.0;
 
 /// How far towards grazing one facet well turns light, over α. A facet of slope
@@ -142,10 +142,10 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
         self.surface.eval(estimator, wo, wi, rng, &mut orders);
     }
 
-    /// How often orders above the first are evaluated. Their share goes with
-    /// the chance to meet a second facet, Λ, along the most grazing direction
-    /// that one facet can well turn the light to: where normals are spread
-    /// unevenly, towards the rougher axis.
+    /// How often orders above the first are evaluated. Their share goes with what
+    /// two facets keep and with the chance to meet a second one, Λ, along the most
+    /// grazing direction that one facet can well turn the light to: where normals are
+    /// spread unevenly, towards the rougher axis.
     #[inline]
     fn chance(&self, wo: Vector3<f32>, wi: Vector3<f32>) -> f32 {
         let low = if wo.z < wi.z.abs() { wo } else { wi };
@@ -178,7 +178,8 @@ impl<N: Width, I: MeanWeight> Rough<N, I> {
                 z: INSIDE,
             }
         };
-        let root = ROOT_CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing);
+        let kept = self.surface.facets.weight_aslant();
+        let root = ROOT_CHANCE_PER_LAMBDA * self.surface.ndf.lambda(grazing) * (kept * kept);
         // Glass reflects so little at one facet that higher orders weigh more.
         let faint = if I::TRANSMITS && wo.z * wi.z > 0.0 {
             root
