@@ -107,7 +107,9 @@ fn a_view_transform_counts_by_its_colours() {
     let room = room("colours");
     let mark = |name: &str, more: &[&str]| {
         room.render(&[&["--spp", "1", "-o", name][..], more].concat());
-        room.image(name).attribute("smithwalk.complete").map(str::to_owned)
+        room.image(name)
+            .attribute("smithwalk.complete")
+            .map(str::to_owned)
     };
     let first = mark("a.exr", &[]);
     assert!(first.is_some());
