@@ -183,8 +183,8 @@ impl<const F: u32> Bsdf<F> {
         rng: &mut impl Draw<f32>,
         tally: &mut impl Tally<f32>,
     ) {
-        for part in self.known() {
-            let Seen { wo, wi, density } = part.see(self.normal, wo, wi);
+        for (part, seen) in self.see(wo, wi) {
+            let Seen { wo, wi, density } = seen;
             if density == 0.0 {
                 continue;
             }
@@ -225,18 +225,38 @@ impl<const F: u32> Bsdf<F> {
     #[must_use]
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let density = |part: &WeightedClosure| {
-            let seen = part.see(self.normal, wo, wi);
+        let density = |part: &WeightedClosure, seen: Seen| {
             if seen.density == 0.0 {
                 return 0.0;
             }
             part.closure.pdf(seen.wo, seen.wi) * seen.density
         };
         if !has::<F>(Features::MIXES) {
-            return self.known().next().map_or(0.0, density);
+            let only = self.known().next();
+            return only.map_or(0.0, |part| density(part, part.see(self.normal, wo, wi)));
         }
-        let sum: f32 = self.known().map(|part| density(part) * part.chance).sum();
+        let sum: f32 = self
+            .see(wo, wi)
+            .map(|(part, seen)| density(part, seen) * part.chance)
+            .sum();
         if sum > 0.0 { sum / self.total } else { 0.0 }
+    }
+
+    /// The closures, each with both directions in its frame. Most mixes have one frame
+    /// for all, which is gone into once.
+    #[inline(always)]
+    fn see(&self, wo: Vec3, wi: Vec3) -> impl Iterator<Item = (&WeightedClosure, Seen)> {
+        let mut last: Option<(&Frame, Seen)> = None;
+        self.known().map(move |part| {
+            let seen = match last {
+                Some((frame, seen)) if *frame == part.frame => seen,
+                _ => part.see(self.normal, wo, wi),
+            };
+            if has::<F>(Features::MIXES) {
+                last = Some((&part.frame, seen));
+            }
+            (part, seen)
+        })
     }
 
     /// The closures, of kinds that there is code for: all.
@@ -269,6 +289,7 @@ impl<const F: u32> Bsdf<F> {
 }
 
 /// Directions in a closure's frame, as the horizon of its normal makes them.
+#[derive(Clone, Copy)]
 struct Seen {
     wo: Vec3,
     wi: Vec3,
