@@ -319,8 +319,8 @@ mod tests {
 
     const N: u32 = 400_000;
 
-    /// Mean, standard error and the share of estimates that are not 0, of the luminance
-    /// of orders above the first.
+    /// Of orders above the first, summed over the channels: mean, standard error and the
+    /// share of estimates that are not 0.
     fn higher(surface: Microsurface<Ggx<f32>, Conductor<f32>>, method: Method) -> [f64; 3] {
         let rough = Rough { surface, method };
         let [wo, wi] = [(0.5, 0.3), (0.7, 2.0)]

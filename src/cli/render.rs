@@ -403,7 +403,8 @@ fn complete_mark(
     } = settings;
     let mut film = description.film.clone();
     film.view = None;
-    let all = format!("{identity:?} {film:?} {display:?} {window:?} {share:?} {limits:?}");
+    let view = xxh3_128(&display.to_bytes());
+    let all = format!("{identity:?} {film:?} {view:032x} {window:?} {share:?} {limits:?}");
     format!("{:032x}", xxh3_128(all.as_bytes()))
 }
 

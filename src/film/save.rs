@@ -190,7 +190,7 @@ impl Film {
         bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
         bytes.extend_from_slice(&header);
         if let Some(finish) = finish {
-            write_display(&finish.display, &mut bytes);
+            bytes.extend_from_slice(&finish.display.to_bytes());
         }
         replace_with(path, |file| {
             let mut hash = Xxh3Default::new();
@@ -312,19 +312,6 @@ impl SavedFilm {
             origin,
             film,
         })
-    }
-}
-
-fn write_display(display: &Display, bytes: &mut Vec<u8>) {
-    bytes.extend_from_slice(&display.exposure.to_le_bytes());
-    let side = display.lut.as_ref().map_or(0, Lut::side);
-    bytes.extend_from_slice(&(side as u32).to_le_bytes());
-    if let Some(lut) = &display.lut {
-        let Log2 { offset, min, max } = lut.domain();
-        let nodes = lut.nodes().as_flattened();
-        for value in [offset, min, max].iter().chain(nodes) {
-            bytes.extend_from_slice(&value.to_le_bytes());
-        }
     }
 }
 

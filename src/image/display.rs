@@ -1,6 +1,6 @@
 //! From scene-linear light to what a display shows.
 
-use super::{Image, Lut};
+use super::{Image, Log2, Lut};
 
 /// How images become 8-bit colours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,6 +20,23 @@ impl Display {
             exposure,
             lut: None,
         }
+    }
+
+    /// All of it, as films hold it: the exposure, the nodes per side of the table (0 for
+    /// none), its domain and its colours, as little-endian numbers of four bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = self.exposure.to_le_bytes().to_vec();
+        let side = self.lut.as_ref().map_or(0, Lut::side);
+        bytes.extend_from_slice(&(side as u32).to_le_bytes());
+        if let Some(lut) = &self.lut {
+            let Log2 { offset, min, max } = lut.domain();
+            let nodes = lut.nodes().as_flattened();
+            for value in [offset, min, max].iter().chain(nodes) {
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
+        }
+        bytes
     }
 
     /// The image's colour in 8 bits, row by row. NaN becomes black.
